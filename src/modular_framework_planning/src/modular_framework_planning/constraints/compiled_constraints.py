@@ -105,7 +105,7 @@ class Workspace(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _new_workspace(constraints):  # type: ignore[no-untyped-def]
+def _new_workspace(constraints: ConstraintArrays) -> Workspace:
     joints, rows = len(constraints.tree.parents), 3 + len(constraints.faces)
     values, placements = np.empty(joints + len(constraints.ranges)), np.empty((joints, 3, 4))
     pose, reference, deviation = np.empty((3, 4)), np.empty((3, 4)), np.empty(3)
@@ -113,7 +113,7 @@ def _new_workspace(constraints):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _place_joints(constraints, mapping, state, workspace):  # type: ignore[no-untyped-def]
+def _place_joints(constraints: ConstraintArrays, mapping: JointMapping, state: Array, workspace: Workspace) -> None:
     """Computes the placements of the tree's joints."""
     drivers, gains, offsets = mapping
     values = workspace.values
@@ -125,7 +125,7 @@ def _place_joints(constraints, mapping, state, workspace):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)
-def _joint_excess(constraints, values):  # type: ignore[no-untyped-def]
+def _joint_excess(constraints: ConstraintArrays, values: Array) -> float:
     """Returns the maximum violation of the joint constraints."""
     ranges, max_excess = constraints.ranges, -np.inf
     first = len(values) - len(ranges)
@@ -138,7 +138,7 @@ def _joint_excess(constraints, values):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_frame(placements, joint, placement, out):  # type: ignore[no-untyped-def]
+def _write_frame(placements: Array, joint: int, placement: Array, out: Array) -> None:
     """Writes the pose in the planning frame of a frame that a joint moves."""
     if joint < 0:
         out[:] = placement
@@ -152,7 +152,7 @@ def _write_frame(placements, joint, placement, out):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True)
-def _write_relative(reference, pose):  # type: ignore[no-untyped-def]
+def _write_relative(reference: Array, pose: Array) -> None:
     """Converts a pose from the planning frame to the reference frame, in place."""
     for column in range(4):
         x, y, z = pose[0, column], pose[1, column], pose[2, column]
@@ -163,7 +163,7 @@ def _write_relative(reference, pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_euler(rotation, tolerance, out):  # type: ignore[no-untyped-def]
+def _write_euler(rotation: Array, tolerance: float, out: Array) -> None:
     """Writes the intrinsic XYZ Euler angles of a rotation.
 
     In gimbal lock the rotation counts as roll, or as yaw if it exceeds the roll tolerance.
@@ -179,7 +179,7 @@ def _write_euler(rotation, tolerance, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _cone_gap(height, radius, distance, z):  # type: ignore[no-untyped-def]
+def _cone_gap(height: float, radius: float, distance: float, z: float) -> tuple[float, float, float]:
     """Returns the distance of a point (distance from the axis, z) from a cone, and the nearest point of the cone."""
     half = 0.5 * height
     if -half <= z <= half and distance * height <= radius * (half - z):
@@ -193,7 +193,7 @@ def _cone_gap(height, radius, distance, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _region_gap(shape, size, faces, point):  # type: ignore[no-untyped-def]
+def _region_gap(shape: int, size: Array, faces: Array, point: Array) -> float:
     """Returns the distance of a point from a region; for a hull, the distance beyond the most violated face."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
@@ -212,7 +212,7 @@ def _region_gap(shape, size, faces, point):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_point(pose, point, out):  # type: ignore[no-untyped-def]
+def _write_point(pose: Array, point: Array, out: Array) -> None:
     """Writes a point of the reference frame in region coordinates."""
     x, y, z = point[0, 3] - pose[0, 3], point[1, 3] - pose[1, 3], point[2, 3] - pose[2, 3]
     for row in range(3):
@@ -220,7 +220,7 @@ def _write_point(pose, point, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _pose_excess(constraints, item, workspace):  # type: ignore[no-untyped-def]
+def _pose_excess(constraints: ConstraintArrays, item: int, workspace: Workspace) -> tuple[float, int]:
     """Writes the deviation of a pose constraint, for the current placements.
 
     Returns:
@@ -254,7 +254,7 @@ def _pose_excess(constraints, item, workspace):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _excess(constraints, mapping, state, workspace):  # type: ignore[no-untyped-def]
+def _excess(constraints: ConstraintArrays, mapping: JointMapping, state: Array, workspace: Workspace) -> float:
     """Returns the maximum violation of the constraints, at most 0 if all are satisfied."""
     _place_joints(constraints, mapping, state, workspace)
     max_excess = _joint_excess(constraints, workspace.values)
@@ -264,7 +264,7 @@ def _excess(constraints, mapping, state, workspace):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True)
-def first_violated(constraints, mapping, states):  # type: ignore[no-untyped-def]
+def first_violated(constraints: ConstraintArrays, mapping: JointMapping, states: Array) -> int:
     """Returns the index of the first state of (s, joints) that violates a constraint, or -1.
 
     Args:
@@ -280,7 +280,15 @@ def first_violated(constraints, mapping, states):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _edge_satisfied(constraints, mapping, start, end, step, state, workspace):  # type: ignore[no-untyped-def]
+def _edge_satisfied(
+    constraints: ConstraintArrays,
+    mapping: JointMapping,
+    start: Array,
+    end: Array,
+    step: float,
+    state: Array,
+    workspace: Workspace,
+) -> bool:
     """Checks the constraints along an edge except at its start, beginning with its end and its middle."""
     max_change = 0.0
     for joint in range(len(start)):
@@ -302,7 +310,7 @@ def _edge_satisfied(constraints, mapping, start, end, step, state, workspace):  
 
 
 @njit(cache=True, nogil=True)
-def edges_satisfied(constraints, mapping, vertices, step):  # type: ignore[no-untyped-def]
+def edges_satisfied(constraints: ConstraintArrays, mapping: JointMapping, vertices: Array, step: float) -> bool:
     """Checks the constraints along a polyline except at its start.
 
     Args:
@@ -319,7 +327,9 @@ def edges_satisfied(constraints, mapping, vertices, step):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)
-def _angle_rows(kind, deviation, tolerances, violated, directions, changes):  # type: ignore[no-untyped-def]
+def _angle_rows(
+    kind: int, deviation: Array, tolerances: Array, violated: bool, directions: Array, changes: Array
+) -> int:
     """Writes the gradients of the angles to change over a rotation of the link, and the required changes."""
     x, y, z = deviation[0], deviation[1], deviation[2]
     count = 0
@@ -356,19 +366,21 @@ def _angle_rows(kind, deviation, tolerances, violated, directions, changes):  # 
 
 
 @njit(cache=True, nogil=True)
-def _inner_limit(length):  # type: ignore[no-untyped-def]
+def _inner_limit(length: float) -> float:
     """Returns the half length within a region that projections aim at."""
     return 0.0 if length <= TIGHT_TOLERANCE else length - min((1.0 - INNER_FRACTION) * length, TIGHT_TOLERANCE)
 
 
 @njit(cache=True, nogil=True)
-def _add_row(x, y, z, change, count, directions, changes):  # type: ignore[no-untyped-def]
+def _add_row(x: float, y: float, z: float, change: float, count: int, directions: Array, changes: Array) -> int:
     directions[count, 0], directions[count, 1], directions[count, 2], changes[count] = x, y, z, change
     return count + 1
 
 
 @njit(cache=True, nogil=True)
-def _axis_row(axis, half, point, violated, count, directions, changes):  # type: ignore[no-untyped-def]
+def _axis_row(
+    axis: int, half: float, point: Array, violated: bool, count: int, directions: Array, changes: Array
+) -> int:
     """Adds the row that keeps a coordinate between -half and half; returns the new number of rows."""
     limit, value = _inner_limit(half), point[axis]
     if limit > 0.0 and (not violated or abs(value) <= limit):
@@ -378,7 +390,9 @@ def _axis_row(axis, half, point, violated, count, directions, changes):  # type:
 
 
 @njit(cache=True, nogil=True)
-def _region_rows(shape, size, faces, point, violated, directions, changes):  # type: ignore[no-untyped-def]
+def _region_rows(
+    shape: int, size: Array, faces: Array, point: Array, violated: bool, directions: Array, changes: Array
+) -> int:
     """Writes the directions in the frame of a region in which a point must move, and the distances."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
@@ -416,7 +430,7 @@ def _region_rows(shape, size, faces, point, violated, directions, changes):  # t
 
 
 @njit(cache=True, nogil=True)
-def _pose_rows(constraints, item, region, violated, workspace):  # type: ignore[no-untyped-def]
+def _pose_rows(constraints: ConstraintArrays, item: int, region: int, violated: bool, workspace: Workspace) -> int:
     """Writes the linearised rows of a pose constraint in the reference frame; returns the number of rows."""
     directions, changes = workspace.directions, workspace.changes
     if region < 0:
@@ -436,7 +450,16 @@ def _pose_rows(constraints, item, region, violated, workspace):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def _add_gradients(constraints, mapping, item, count, first, workspace, jacobian, targets):  # type: ignore[no-untyped-def]
+def _add_gradients(
+    constraints: ConstraintArrays,
+    mapping: JointMapping,
+    item: int,
+    count: int,
+    first: int,
+    workspace: Workspace,
+    jacobian: Array,
+    targets: Array,
+) -> None:
     """Writes the Jacobian rows and the target changes of a pose constraint."""
     tree, signs, reference, pose = constraints.tree, constraints.signs[item], workspace.reference, workspace.pose
     is_rotation = constraints.kinds[item] != POINT
@@ -469,7 +492,9 @@ def _add_gradients(constraints, mapping, item, count, first, workspace, jacobian
 
 
 @njit(cache=True, nogil=True)
-def _write_step(jacobian, targets, count, free, gram, solution, step):  # type: ignore[no-untyped-def]
+def _write_step(
+    jacobian: Array, targets: Array, count: int, free: NDArray[np.bool_], gram: Array, solution: Array, step: Array
+) -> None:
     """Writes the least-squares step of the free joints, scaled to at most MAX_STEP per joint."""
     damped_step(jacobian, targets, count, DAMPING, free, step, gram, solution)
     max_change = 1.0e-12
@@ -481,7 +506,9 @@ def _write_step(jacobian, targets, count, free, gram, solution, step):  # type: 
 
 
 @njit(cache=True, nogil=True)
-def project(constraints, mapping, state, lower, upper, steps):  # type: ignore[no-untyped-def]
+def project(
+    constraints: ConstraintArrays, mapping: JointMapping, state: Array, lower: Array, upper: Array, steps: int
+) -> bool:
     """Moves a state by least-squares steps within bounds until all constraints hold.
 
     Joints at a bound stay fixed if the step would violate the bound; the step is then computed for the other joints.
@@ -531,7 +558,7 @@ def project(constraints, mapping, state, lower, upper, steps):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True)
-def _distance(first, second):  # type: ignore[no-untyped-def]
+def _distance(first: Array, second: Array) -> float:
     squared_distance = 0.0
     for joint in range(len(first)):
         squared_distance += (second[joint] - first[joint]) * (second[joint] - first[joint])
@@ -539,20 +566,18 @@ def _distance(first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def nearest_state(states, target):  # type: ignore[no-untyped-def]
-    """Returns the index of the state in (n, joints) nearest to a target state."""
-    best, nearest = np.inf, 0
-    for index in range(len(states)):
-        squared_distance = 0.0
-        for joint in range(len(target)):
-            squared_distance += (states[index, joint] - target[joint]) ** 2
-        if squared_distance < best:
-            best, nearest = squared_distance, index
-    return nearest
-
-
-@njit(cache=True, nogil=True)
-def walk(constraints, mapping, start, target, lower, upper, max_step, min_step, step, out):  # type: ignore[no-untyped-def]
+def walk(
+    constraints: ConstraintArrays,
+    mapping: JointMapping,
+    start: Array,
+    target: Array,
+    lower: Array,
+    upper: Array,
+    max_step: float,
+    min_step: float,
+    step: float,
+    out: Array,
+) -> int:
     """Walks from a state towards a target along the constraints, by straight steps and projections.
 
     A step is halved if the constraints are violated along it, and doubled after a successful step.

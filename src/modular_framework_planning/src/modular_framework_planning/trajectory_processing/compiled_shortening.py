@@ -10,23 +10,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
-from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, world_of
 from modular_framework_planning.collision_detection.kernels.compiled_edges import (
     FREE,
     UNKNOWN,
+    EdgeMemory,
+    GroupEdges,
     check_edge,
     new_edge,
     recall,
     remember,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_paths import new_workspace, release
+from modular_framework_planning.collision_detection.kernels.compiled_paths import (
+    Samples,
+    Workspace,
+    new_workspace,
+    release,
+)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
@@ -67,7 +74,7 @@ class Shortening(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _distance(first, second):  # type: ignore[no-untyped-def]
+def _distance(first: Array, second: Array) -> float:
     squared_length = 0.0
     for joint in range(len(first)):
         squared_length += (second[joint] - first[joint]) ** 2
@@ -75,7 +82,7 @@ def _distance(first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _lengths(path, size):  # type: ignore[no-untyped-def]
+def _lengths(path: Array, size: int) -> Array:
     """Returns the path length up to each vertex."""
     lengths = np.zeros(size)
     for index in range(1, size):
@@ -84,7 +91,7 @@ def _lengths(path, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _enter_stage(shortening, stage):  # type: ignore[no-untyped-def]
+def _enter_stage(shortening: Shortening, stage: int) -> None:
     """Enters a stage; a path of two vertices is done."""
     path, _, progress, _, min_gain = shortening
     if stage == PULLS:
@@ -101,7 +108,7 @@ def _enter_stage(shortening, stage):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def next_edge(shortening):  # type: ignore[no-untyped-def]
+def next_edge(shortening: Shortening) -> bool:
     """Writes the next edge that would change the path; returns False if the shortening is done."""
     progress = shortening.progress
     while progress[STAGE] != DONE:
@@ -119,7 +126,7 @@ def next_edge(shortening):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def apply_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+def apply_verdict(shortening: Shortening, is_free: bool) -> None:
     """Changes the path if the proposed edge is free."""
     stage = shortening.progress[STAGE]
     if stage == DROPS:
@@ -132,7 +139,7 @@ def apply_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _keep(shortening, vertex):  # type: ignore[no-untyped-def]
+def _keep(shortening: Shortening, vertex: int) -> None:
     """Appends a vertex to the kept vertices."""
     path, _, progress, _, _ = shortening
     progress[KEPT] += 1
@@ -141,7 +148,7 @@ def _keep(shortening, vertex):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _next_drop(shortening):  # type: ignore[no-untyped-def]
+def _next_drop(shortening: Shortening) -> bool:
     path, edge, progress, _, _ = shortening
     while progress[BASE] < progress[SIZE] - 1:
         progress[CANDIDATE] -= 1
@@ -154,9 +161,9 @@ def _next_drop(shortening):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_point(path, lengths, path_position, out):  # type: ignore[no-untyped-def]
+def _write_point(path: Array, lengths: Array, path_position: float, out: Array) -> int:
     """Writes the point at a length along the path and returns the index of the vertex before this point."""
-    index = min(max(np.searchsorted(lengths, path_position, side="right") - 1, 0), len(lengths) - 2)
+    index = min(max(int(np.searchsorted(lengths, path_position, side="right")) - 1, 0), len(lengths) - 2)
     span = lengths[index + 1] - lengths[index]
     fraction = 0.0 if span <= 0.0 else (path_position - lengths[index]) / span
     for joint in range(len(out)):
@@ -165,7 +172,7 @@ def _write_point(path, lengths, path_position, out):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True)
-def _next_shortcut(shortening):  # type: ignore[no-untyped-def]
+def _next_shortcut(shortening: Shortening) -> bool:
     path, edge, progress, random_numbers, _ = shortening
     if progress[SIZE] < 3:
         return False
@@ -189,7 +196,7 @@ def _next_shortcut(shortening):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _apply_shortcut_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+def _apply_shortcut_verdict(shortening: Shortening, is_free: bool) -> None:
     path, edge, progress, _, _ = shortening
     if not is_free:
         progress[FAILURES] += 1
@@ -207,7 +214,7 @@ def _apply_shortcut_verdict(shortening, is_free):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _next_pull(shortening):  # type: ignore[no-untyped-def]
+def _next_pull(shortening: Shortening) -> bool:
     path, edge, progress, _, min_gain = shortening
     if progress[CHECKS_SECOND_EDGE]:
         return True
@@ -240,7 +247,7 @@ def _next_pull(shortening):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _apply_pull_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+def _apply_pull_verdict(shortening: Shortening, is_free: bool) -> None:
     path, edge, progress, _, _ = shortening
     if is_free and not progress[CHECKS_SECOND_EDGE]:
         edge[0], edge[1], progress[CHECKS_SECOND_EDGE] = edge[1], path[progress[VERTEX] + 1], 1
@@ -251,13 +258,15 @@ def _apply_pull_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def begin(shortening):  # type: ignore[no-untyped-def]
+def begin(shortening: Shortening) -> None:
     """Starts the shortening of a new path; without random numbers, vertices are only dropped."""
     _enter_stage(shortening, DROPS)
 
 
 @njit(cache=True, nogil=True)
-def shorten_in(shortening, edges, memory, verdict, *world):  # type: ignore[no-untyped-def]
+def shorten_in(
+    shortening: Shortening, edges: GroupEdges, memory: EdgeMemory, verdict: int, *world: NDArray[Any]
+) -> int:
     """Shortens a path with compiled edge checks.
 
     Args:
@@ -283,7 +292,15 @@ def shorten_in(shortening, edges, memory, verdict, *world):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def _shorten_in(shortening, edges, memory, verdict, world, samples, workspace):  # type: ignore[no-untyped-def]
+def _shorten_in(
+    shortening: Shortening,
+    edges: GroupEdges,
+    memory: EdgeMemory,
+    verdict: int,
+    world: World,
+    samples: Samples,
+    workspace: Workspace,
+) -> int:
     no_rows = np.empty((0, 2), np.int64)
     if verdict != UNKNOWN:
         apply_verdict(shortening, verdict == FREE)

@@ -14,6 +14,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     CLEAR,
     ROUNDING,
     SURFACE,
+    Memory,
     Solid,
     solid_distance,
     surface_to_solid,
@@ -94,7 +95,7 @@ class World(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def place_bodies(world, placements, out, centres, with_world=True):  # type: ignore[no-untyped-def]
+def place_bodies(world: World, placements: Array, out: Array, centres: Array, with_world: bool = True) -> None:
     """Writes body poses and sphere centres in the planning frame.
 
     Args:
@@ -129,8 +130,14 @@ def place_bodies(world, placements, out, centres, with_world=True):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def relative_pose(one, two, relative):  # type: ignore[no-untyped-def]
-    """Writes the first pose in the frame of the second; all poses have shape (3, 4)."""
+def relative_pose(one: Array, two: Array, relative: Array) -> None:
+    """Writes the first pose in the frame of the second.
+
+    Args:
+        one: First pose, shape (3, 4).
+        two: Second pose, shape (3, 4).
+        relative: Result, shape (3, 4).
+    """
     for row in range(3):
         for column in range(4):
             value = 0.0
@@ -141,14 +148,26 @@ def relative_pose(one, two, relative):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def solid_of(kinds, sizes, body):  # type: ignore[no-untyped-def]
-    """Returns the closed form of a body; `kinds` and `sizes` as in World."""
+def solid_of(kinds: NDArray[np.int64], sizes: Array, body: int) -> Solid:
+    """Returns the closed form of a body.
+
+    Args:
+        kinds: Kind of each body, as in World.
+        sizes: Sizes of each body, as in World.
+        body: Index of the body.
+    """
     return Solid(kinds[body], sizes[body, 0], sizes[body, 1], sizes[body, 2])
 
 
 @njit(cache=True, nogil=True)
-def centre_distance(centres, first, second):  # type: ignore[no-untyped-def]
-    """Returns the distance between two rows of `centres`, shape (b, 3) [m]."""
+def centre_distance(centres: Array, first: int, second: int) -> float:
+    """Returns the distance between two centres [m].
+
+    Args:
+        centres: Centres of the bounding spheres, shape (b, 3) [m].
+        first: Index of one centre.
+        second: Index of the other centre.
+    """
     x, y, z = (
         centres[first, 0] - centres[second, 0],
         centres[first, 1] - centres[second, 1],
@@ -158,7 +177,9 @@ def centre_distance(centres, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-untyped-def]
+def pair_bound(
+    world: World, pair: int, poses: Array, centres: Array, limit: float, memory: Memory
+) -> tuple[int, float]:
     """Bounds the distance of a pair minus the pair's margin.
 
     Args:
@@ -190,7 +211,7 @@ def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
+def _contains(world: World, outer: int, inner: int, poses: Array) -> bool:
     """Returns whether the outer body surrounds a point of the inner body; valid if their surfaces do not touch."""
     if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
@@ -225,8 +246,14 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
-    """Returns the first pair with one body inside the other, or -1; valid if no pair touches."""
+def surrounded_pair(world: World, poses: Array, centres: Array) -> int:
+    """Returns the first pair with one body inside the other, or -1; valid if no pair touches.
+
+    Args:
+        world: Bodies and pairs.
+        poses: Pose of each body, shape (b, 3, 4).
+        centres: Centre of each bounding sphere, shape (b, 3) [m].
+    """
     pairs, excess, spheres = world.pairs, world.excess, world.spheres
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
@@ -246,7 +273,7 @@ def arguments(world: World) -> tuple[NDArray[Any], ...]:
 
 
 @njit(cache=True, nogil=True)
-def world_of(arrays):  # type: ignore[no-untyped-def]
+def world_of(arrays: tuple[NDArray[Any], ...]) -> World:
     """Rebuilds a World, without array owners, from the result of `arguments`."""
     a = borrowed(arrays)
     # numba supports only one starred argument per call
@@ -257,13 +284,13 @@ def world_of(arrays):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def surrounded_pair_at(positions, *world):  # type: ignore[no-untyped-def]
+def surrounded_pair_at(positions: Array, *world: NDArray[Any]) -> int:
     """Returns the first pair with one body inside the other at these joint positions, or -1."""
     return _surrounded_at(world_of(world), positions)
 
 
 @njit(cache=True, nogil=True)
-def _surrounded_at(world, positions):  # type: ignore[no-untyped-def]
+def _surrounded_at(world: World, positions: Array) -> int:
     placements = np.empty((len(positions), 3, 4))
     poses, centres = np.empty((len(world.joints), 3, 4)), np.empty((len(world.joints), 3))
     joint_placements(world.tree, positions, placements)

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
+    Surfaces,
     halve_longest_edge,
     triangle_distance,
 )
@@ -73,14 +74,14 @@ class Memory(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def new_memory():  # type: ignore[no-untyped-def]
+def new_memory() -> Memory:
     """Returns working memory."""
     stack = np.empty((STACK_SIZE, 2), np.int32)
     return Memory(np.empty((3, 4)), stack, np.empty(STACK_SIZE), np.empty((64, 9)), np.empty(9))
 
 
 @njit(cache=True, nogil=True)
-def solid_distance(solid, x, y, z):  # type: ignore[no-untyped-def]
+def solid_distance(solid: Solid, x: float, y: float, z: float) -> float:
     """Returns the distance of a point from a solid, or a lower bound [m]; negative inside the solid.
 
     The solid's parameters p0, p1, p2 are the half extents of a box, the radius and half height of a cylinder, cone or
@@ -115,7 +116,7 @@ def solid_distance(solid, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def placed_solid_distance(solid, poses, body, x, y, z):  # type: ignore[no-untyped-def]
+def placed_solid_distance(solid: Solid, poses: Array, body: int, x: float, y: float, z: float) -> float:
     """Returns the solid_distance of a point in the planning frame.
 
     Args:
@@ -136,7 +137,7 @@ def placed_solid_distance(solid, poses, body, x, y, z):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def _cone_distance(radius, half, r, z):  # type: ignore[no-untyped-def]
+def _cone_distance(radius: float, half: float, r: float, z: float) -> float:
     """Returns the distance of (r, z) from the triangle (0, -half), (radius, -half), (0, half) in the half plane."""
     slant = np.sqrt(radius * radius + 4.0 * half * half)
     above_side = (2.0 * half * r + radius * (z - half)) / slant
@@ -153,12 +154,12 @@ def _cone_distance(radius, half, r, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _gap(low, high, half):  # type: ignore[no-untyped-def]
+def _gap(low: float, high: float, half: float) -> float:
     return max(max(low - half, -half - high), 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _span_bound(solid, pieces, n):  # type: ignore[no-untyped-def]
+def _span_bound(solid: Solid, pieces: Array, n: int) -> float:
     """Bounds the distance of the triangle pieces[n] from a box or cylinder by the triangle's axis-aligned extent."""
     kind, p0, p1, p2 = solid
     x, y, z = (
@@ -175,7 +176,9 @@ def _span_bound(solid, pieces, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_solid(triangles, index, pose, solid, margin, excess, limit, pieces):  # type: ignore[no-untyped-def]
+def _triangle_to_solid(
+    triangles: Array, index: int, pose: Array, solid: Solid, margin: float, excess: float, limit: float, pieces: Array
+) -> tuple[int, float]:
     """Returns status and lower bound (at most `limit`) of a triangle's distance from a solid, by subdivision."""
     for vertex in range(0, 9, 3):
         x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
@@ -213,7 +216,7 @@ def _triangle_to_solid(triangles, index, pose, solid, margin, excess, limit, pie
 
 
 @njit(cache=True, nogil=True)
-def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
+def _box_to_solid(boxes: Array, node: int, pose: Array, solid: Solid) -> float:
     """Bounds the distance of a tree's box from a solid along the face normals of the box and of the solid's box."""
     kind, p0, p1, p2 = solid
     if kind in (PLANE, HALF_SPACE):
@@ -238,7 +241,7 @@ def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _box_to_box(boxes, node, other_boxes, other, pose):  # type: ignore[no-untyped-def]
+def _box_to_box(boxes: Array, node: int, other_boxes: Array, other: int, pose: Array) -> float:
     """Bounds the distance of two trees' boxes along their face normals."""
     x, y, z = boxes[node, 0], boxes[node, 1], boxes[node, 2]
     dx = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_boxes[other, 0]
@@ -271,7 +274,9 @@ def _box_to_box(boxes, node, other_boxes, other, pose):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def surface_to_solid(surface, root, pose, solid, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
+def surface_to_solid(
+    surface: Surfaces, root: int, pose: Array, solid: Solid, margin: float, excess: float, limit: float, memory: Memory
+) -> tuple[int, float]:
     """Bounds the distance of a surface from a solid.
 
     Args:
@@ -324,7 +329,7 @@ def surface_to_solid(surface, root, pose, solid, margin, excess, limit, memory):
 
 
 @njit(cache=True, nogil=True)
-def _centre_distance(spheres, node, pose, solid):  # type: ignore[no-untyped-def]
+def _centre_distance(spheres: Array, node: int, pose: Array, solid: Solid) -> float:
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return solid_distance(
         solid,
@@ -335,7 +340,7 @@ def _centre_distance(spheres, node, pose, solid):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-untyped-def]
+def _sphere_gap(spheres: Array, node: int, other_spheres: Array, other: int, pose: Array) -> float:
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return np.sqrt(
         (pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_spheres[other, 0]) ** 2
@@ -345,9 +350,17 @@ def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def surface_to_surface(  # type: ignore[no-untyped-def]
-    surface, root, other_surface, other_root, pose, margin, excess, limit, memory
-):
+def surface_to_surface(
+    surface: Surfaces,
+    root: int,
+    other_surface: Surfaces,
+    other_root: int,
+    pose: Array,
+    margin: float,
+    excess: float,
+    limit: float,
+    memory: Memory,
+) -> tuple[int, float]:
     """Bounds the distance between two surfaces.
 
     Args:
@@ -410,7 +423,9 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_triangle(triangles, index, pose, others, other, vertices):  # type: ignore[no-untyped-def]
+def _triangle_to_triangle(
+    triangles: Array, index: int, pose: Array, others: Array, other: int, vertices: Array
+) -> float:
     for vertex in range(0, 9, 3):
         x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
         for row in range(3):
@@ -419,7 +434,9 @@ def _triangle_to_triangle(triangles, index, pose, others, other, vertices):  # t
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _motion_in_rotations(spheres, node, pose, origins, axes, max_angles):  # type: ignore[no-untyped-def]
+def _motion_in_rotations(
+    spheres: Array, node: int, pose: Array, origins: Array, axes: Array, max_angles: Array
+) -> float:
     """Bounds the motion of any point of a node's sphere under Rotations [m], plus ROUNDING."""
     x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
     px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
@@ -435,7 +452,9 @@ def _motion_in_rotations(spheres, node, pose, origins, axes, max_angles):  # typ
 
 
 @njit(cache=True, nogil=True)
-def surfaces_stay_apart(surface, root, other_surface, other_root, pose, rotations):  # type: ignore[no-untyped-def]
+def surfaces_stay_apart(
+    surface: Surfaces, root: int, other_surface: Surfaces, other_root: int, pose: Array, rotations: Rotations
+) -> bool:
     """Returns whether two surfaces provably stay apart while the first surface rotates.
 
     Args:

@@ -18,10 +18,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     ROUNDING,
     TOO_CLOSE,
     TOUCHING,
+    Memory,
     Solid,
     placed_solid_distance,
     surface_to_solid,
 )
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.geometry.spatial import Array
 
 NEAREST_SOLIDS = 6  # stored per cell
@@ -50,13 +52,24 @@ class DistanceField(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _solid_gap(kinds, sizes, poses, solid_index, x, y, z):  # type: ignore[no-untyped-def]
+def _solid_gap(
+    kinds: NDArray[np.int64], sizes: Array, poses: Array, solid_index: int, x: float, y: float, z: float
+) -> float:
     solid = Solid(kinds[solid_index], sizes[solid_index, 0], sizes[solid_index, 1], sizes[solid_index, 2])
     return placed_solid_distance(solid, poses, solid_index, x, y, z)
 
 
 @njit(cache=True, nogil=True)
-def _fill_cell(kinds, sizes, poses, nearest, distances, x, y, z):  # type: ignore[no-untyped-def]
+def _fill_cell(
+    kinds: NDArray[np.int64],
+    sizes: Array,
+    poses: Array,
+    nearest: NDArray[np.int32],
+    distances: Array,
+    x: float,
+    y: float,
+    z: float,
+) -> None:
     """Writes the solids nearest to the point (x, y, z), and their distances; both have shape (k,)."""
     stored, filled = len(nearest), 0
     for solid_index in range(len(kinds)):
@@ -72,8 +85,14 @@ def _fill_cell(kinds, sizes, poses, nearest, distances, x, y, z):  # type: ignor
 
 
 @njit(cache=True, nogil=True)
-def field_cell(field, x, y, z):  # type: ignore[no-untyped-def]
-    """Fills the cell of the point (x, y, z).
+def field_cell(field: DistanceField, x: float, y: float, z: float) -> tuple[int, int, int, float]:
+    """Fills the cell that contains a point.
+
+    Args:
+        field: Distance field.
+        x: Coordinate of the point in the field's frame [m].
+        y: Coordinate of the point in the field's frame [m].
+        z: Coordinate of the point in the field's frame [m].
 
     Returns:
         The three indices of the cell, -1 outside the grid, and the distance of the point from the cell centre [m].
@@ -94,7 +113,7 @@ def field_cell(field, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def field_distance(field, x, y, z, sufficient):  # type: ignore[no-untyped-def]
+def field_distance(field: DistanceField, x: float, y: float, z: float, sufficient: float) -> float:
     """Returns a lower bound of a point's distance from the nearest solid, exact if less than `sufficient` [m].
 
     Args:
@@ -124,7 +143,7 @@ def field_distance(field, x, y, z, sufficient):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _pose_in_solid(pose, poses, solid_index, out):  # type: ignore[no-untyped-def]
+def _pose_in_solid(pose: Array, poses: Array, solid_index: int, out: Array) -> None:
     """Writes a pose, shape (3, 4), in the frame of a solid."""
     for row in range(3):
         for column in range(4):
@@ -136,7 +155,16 @@ def _pose_in_solid(pose, poses, solid_index, out):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
+def surface_to_field(
+    surface: Surfaces,
+    root: int,
+    pose: Array,
+    field: DistanceField,
+    margin: float,
+    excess: float,
+    limit: float,
+    memory: Memory,
+) -> tuple[int, float]:
     """Bounds the distance of a surface from all solids of a field.
 
     Args:
@@ -176,7 +204,7 @@ def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):
 
 
 @njit(cache=True, nogil=True)
-def _placed_centre(spheres, node, pose):  # type: ignore[no-untyped-def]
+def _placed_centre(spheres: Array, node: int, pose: Array) -> tuple[float, float, float]:
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return (
         pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],

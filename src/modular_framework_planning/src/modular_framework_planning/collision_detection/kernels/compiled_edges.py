@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
-from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, world_of
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
+    Workspace,
     check_samples,
     count_verdict,
     index_samples,
@@ -67,7 +68,7 @@ def new_memory(joints: int) -> EdgeMemory:
 
 
 @njit(cache=True, nogil=True)
-def recall(memory, start, end, step):  # type: ignore[no-untyped-def]
+def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
     """Returns the remembered verdict on an edge: FREE, BLOCKED, or UNKNOWN.
 
     Args:
@@ -89,7 +90,7 @@ def recall(memory, start, end, step):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def remember(memory, start, end, step, verdict):  # type: ignore[no-untyped-def]
+def remember(memory: EdgeMemory, start: Array, end: Array, step: float, verdict: int) -> None:
     """Stores the verdict on an edge.
 
     Args:
@@ -106,14 +107,14 @@ def remember(memory, start, end, step, verdict):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def new_edge(edges):  # type: ignore[no-untyped-def]
+def new_edge(edges: GroupEdges) -> Samples:
     """Returns working memory for the samples of an edge."""
     joints = len(edges.rest)
     return Samples(np.empty((2, joints)), np.empty(2, np.int64), np.empty((2, joints)))
 
 
 @njit(cache=True, nogil=True)
-def _write_positions(edges, state, out):  # type: ignore[no-untyped-def]
+def _write_positions(edges: GroupEdges, state: Array, out: Array) -> None:
     """Writes the whole robot's joint positions, shape (all,), for a joint vector of the group."""
     for row in range(len(out)):
         out[row] = edges.rest[row]
@@ -122,7 +123,15 @@ def _write_positions(edges, state, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def check_edge(edges, world, start, end, samples, undecided, workspace):  # type: ignore[no-untyped-def]
+def check_edge(
+    edges: GroupEdges,
+    world: World,
+    start: Array,
+    end: Array,
+    samples: Samples,
+    undecided: NDArray[np.int64],
+    workspace: Workspace,
+) -> int:
     """Returns FREE, BLOCKED, or UNKNOWN if the bounds do not decide; the start of the edge is not checked.
 
     Args:
@@ -144,7 +153,7 @@ def check_edge(edges, world, start, end, samples, undecided, workspace):  # type
 
 
 @njit(cache=True, nogil=True)
-def check_edges(edges, motions, *world):  # type: ignore[no-untyped-def]
+def check_edges(edges: GroupEdges, motions: Array, *world: NDArray[Any]) -> NDArray[np.int64]:
     """Returns the verdict of `check_edge` for each motion.
 
     Args:
@@ -162,7 +171,9 @@ def check_edges(edges, motions, *world):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _check_all(edges, world, motions, samples, workspace, verdicts):  # type: ignore[no-untyped-def]
+def _check_all(
+    edges: GroupEdges, world: World, motions: Array, samples: Samples, workspace: Workspace, verdicts: NDArray[np.int64]
+) -> None:
     no_rows = np.empty((0, 2), np.int64)
     for index in range(len(motions)):
         start, end = motions[index, 0], motions[index, 1]

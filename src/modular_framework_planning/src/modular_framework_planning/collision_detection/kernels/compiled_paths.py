@@ -8,7 +8,7 @@ evaluated samples are computed, so that a fine step costs no more than a coarse 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -23,6 +23,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     FOUND_TOUCHING,
     REQUESTED,
     UNKNOWN,
+    World,
     centre_distance,
     pair_bound,
     place_bodies,
@@ -64,7 +65,7 @@ class Samples(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def sample(vertices, step):  # type: ignore[no-untyped-def]
+def sample(vertices: Array, step: float) -> Samples:
     """Returns samples at most `step` [rad or m] apart in every joint on the polyline `vertices`, shape (n, joints)."""
     samples = Samples(vertices, np.zeros(len(vertices), np.int64), np.zeros(vertices.shape))
     index_samples(samples, step)
@@ -72,7 +73,7 @@ def sample(vertices, step):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def index_samples(samples, step):  # type: ignore[no-untyped-def]
+def index_samples(samples: Samples, step: float) -> None:
     """Writes the sample index and the travelled joint distances of each vertex."""
     vertices, at_vertices, travelled = samples
     count, joints = vertices.shape
@@ -87,7 +88,7 @@ def index_samples(samples, step):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _segment_of(at_vertices, index):  # type: ignore[no-untyped-def]
+def _segment_of(at_vertices: NDArray[np.int64], index: int) -> tuple[int, float]:
     """Returns the vertex before a sample, and the sample's fraction of the segment after this vertex."""
     low, high = 0, len(at_vertices) - 1
     while high - low > 1:
@@ -100,7 +101,7 @@ def _segment_of(at_vertices, index):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def write_row(rows, at_vertices, index, out):  # type: ignore[no-untyped-def]
+def write_row(rows: Array, at_vertices: NDArray[np.int64], index: int, out: Array) -> None:
     """Interpolates a row at a sample.
 
     Args:
@@ -117,7 +118,9 @@ def write_row(rows, at_vertices, index, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_joint_ranges(vertices, at_vertices, low, high, first, last, joint_ranges):  # type: ignore[no-untyped-def]
+def _write_joint_ranges(
+    vertices: Array, at_vertices: NDArray[np.int64], low: int, high: int, first: Array, last: Array, joint_ranges: Array
+) -> None:
     """Writes minimum and maximum joint positions, shape (2, joints), between samples `low` and `high`."""
     for joint in range(vertices.shape[1]):
         joint_ranges[0, joint], joint_ranges[1, joint] = min(first[joint], last[joint]), max(first[joint], last[joint])
@@ -157,7 +160,7 @@ class Stretch(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _new_stretch(joints, bodies):  # type: ignore[no-untyped-def]
+def _new_stretch(joints: int, bodies: int) -> Stretch:
     placements, poses, centres = np.empty((joints, 3, 4)), np.empty((bodies, 3, 4)), np.empty((bodies, 3))
     axes, sample_ranges, joint_ranges = np.empty((joints, 6)), np.empty((2, joints)), np.empty((2, joints))
     change, signs, motions, rows = np.empty(joints), np.empty(joints), np.zeros(bodies), np.empty((3, joints))
@@ -179,20 +182,20 @@ class Workspace(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def new_workspace(world):  # type: ignore[no-untyped-def]
+def new_workspace(world: World) -> Workspace:
     """Returns working memory for path checks in a world."""
     joints, bodies = len(world.tree.parents), len(world.joints)
     return Workspace(_new_stretch(joints, bodies), new_memory(), world.watched.copy())
 
 
 @njit(cache=True, nogil=True)
-def release(workspace):  # type: ignore[no-untyped-def]
+def release(workspace: Workspace) -> None:
     """Keeps working memory alive up to this call, because borrowed arrays do not."""
     workspace.stretch.motions[:], workspace.memory.bounds[0] = 0.0, 0.0
 
 
 @njit(cache=True, nogil=True)
-def evaluate_middle(world, samples, low, high, is_first, stretch):  # type: ignore[no-untyped-def]
+def evaluate_middle(world: World, samples: Samples, low: int, high: int, is_first: bool, stretch: Stretch) -> float:
     """Places the bodies at the middle sample of a stretch and bounds their motion to both ends.
 
     Args:
@@ -250,7 +253,7 @@ def evaluate_middle(world, samples, low, high, is_first, stretch):  # type: igno
 
 
 @njit(cache=True, nogil=True)
-def _write_axes(directions, placements, out):  # type: ignore[no-untyped-def]
+def _write_axes(directions: Array, placements: Array, out: Array) -> None:
     """Writes a point and the direction of each joint axis."""
     for joint in range(len(out)):
         a, b, c = directions[joint, 0], directions[joint, 1], directions[joint, 2]
@@ -261,14 +264,25 @@ def _write_axes(directions, placements, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _is_straight(at_vertices, low, high):  # type: ignore[no-untyped-def]
+def _is_straight(at_vertices: NDArray[np.int64], low: int, high: int) -> bool:
     """Returns whether all samples from `low` to `high` lie on one segment."""
     begin, (end, fraction) = _segment_of(at_vertices, low)[0], _segment_of(at_vertices, high)
     return end == begin or (end == begin + 1 and fraction == 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, joint, until):  # type: ignore[no-untyped-def]
+def _motion_of(
+    parents: NDArray[np.int64],
+    prismatic: NDArray[np.bool_],
+    axes: Array,
+    change: Array,
+    signs: Array,
+    centres: Array,
+    spheres: Array,
+    body: int,
+    joint: int,
+    until: int,
+) -> float:
     """Bounds the motion of any point of a body relative to the joint `until` [m]; other arguments as in Stretch.
 
     The result is the smaller of two bounds. Let d_j be the maximum motion of joint j, o_j and a_j a point and the
@@ -312,7 +326,7 @@ def _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, 
 
 
 @njit(cache=True, nogil=True)
-def _certified_sample(samples, near, far, change, rows):  # type: ignore[no-untyped-def]
+def _certified_sample(samples: Samples, near: int, far: int, change: Array, rows: Array) -> int:
     """Returns the last sample from `near` towards `far` up to which no joint moves by more than `change`.
 
     Args:
@@ -338,7 +352,7 @@ def _certified_sample(samples, near, far, change, rows):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True)
-def _is_within(row, start_row, change):  # type: ignore[no-untyped-def]
+def _is_within(row: Array, start_row: Array, change: Array) -> bool:
     for joint in range(len(change)):  # noqa: SIM110 - numba compiles no generator
         if abs(row[joint] - start_row[joint]) > change[joint]:
             return False
@@ -346,7 +360,14 @@ def _is_within(row, start_row, change):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _table_verdict(world, tables, table_joints, table_of, pair, joint_ranges):  # type: ignore[no-untyped-def]
+def _table_verdict(
+    world: World,
+    tables: NDArray[np.int8],
+    table_joints: NDArray[np.int64],
+    table_of: NDArray[np.int64],
+    pair: int,
+    joint_ranges: Array,
+) -> int:
     verdict = table_verdict(tables, table_of[pair], table_joints, joint_ranges)
     if verdict == UNKNOWN:
         fill_cells(world, pair, joint_ranges)
@@ -355,7 +376,7 @@ def _table_verdict(world, tables, table_joints, table_of, pair, joint_ranges):  
 
 
 @njit(cache=True, nogil=True)
-def _with_capacity(rows, count):  # type: ignore[no-untyped-def]
+def _with_capacity(rows: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Returns the array, or a larger copy if it has fewer than `count` rows."""
     if count <= len(rows):
         return rows
@@ -365,7 +386,7 @@ def _with_capacity(rows, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def]
+def check_path(world: World, samples: Samples, first: int, undecided: NDArray[np.int64]) -> tuple[int, int]:
     """Checks the samples of a path; samples within the clearance of an evaluated sample are skipped.
 
     Args:
@@ -385,7 +406,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _move_to_front(order, pair):  # type: ignore[no-untyped-def]
+def _move_to_front(order: NDArray[np.int64], pair: int) -> None:
     """Moves a pair to the front of the order, because the pair that touched last often touches next."""
     position = 0
     while order[position] != pair:
@@ -398,7 +419,9 @@ def _move_to_front(order, pair):  # type: ignore[no-untyped-def]
 
 # The loop over pairs is written inline on single arrays, because a call costs more than most pair checks.
 @njit(cache=True, nogil=True)
-def check_samples(world, samples, first, undecided, workspace):  # type: ignore[no-untyped-def]
+def check_samples(
+    world: World, samples: Samples, first: int, undecided: NDArray[np.int64], workspace: Workspace
+) -> tuple[int, int]:
     """Does the same as check_path in given working memory; no array should have an owner (see `borrowed`).
 
     Args:
@@ -518,7 +541,7 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def count_verdict(counts, status):  # type: ignore[no-untyped-def]
+def count_verdict(counts: NDArray[np.int64], status: int) -> None:
     """Counts a check and its status in World.counts."""
     counts[REQUESTED] += 1
     if status == CLEAR:
@@ -528,7 +551,9 @@ def count_verdict(counts, status):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def check_polyline(vertices, step, first, undecided, *world):  # type: ignore[no-untyped-def]
+def check_polyline(
+    vertices: Array, step: float, first: int, undecided: NDArray[np.int64], *world: NDArray[Any]
+) -> tuple[int, int, NDArray[np.int64]]:
     """Checks a polyline at samples.
 
     Args:
@@ -548,8 +573,7 @@ def check_polyline(vertices, step, first, undecided, *world):  # type: ignore[no
     return status, index, samples.at_vertices
 
 
-@njit(cache=True, nogil=True)
-def sample_at(vertices, at_vertices, index):  # type: ignore[no-untyped-def]
+def sample_at(vertices: Array, at_vertices: NDArray[np.int64], index: int) -> Array:
     """Returns the joint positions at a sample, shape (joints,).
 
     Args:

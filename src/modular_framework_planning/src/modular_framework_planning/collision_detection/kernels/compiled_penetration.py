@@ -65,13 +65,22 @@ def bounding_spheres_of(world: World) -> BoundingSpheres:
 
 
 @njit(cache=True, nogil=True)
-def _place(pose, local, out):  # type: ignore[no-untyped-def]
+def _place(pose: Array, local: Array, out: Array) -> None:
     for row in range(3):
         out[row] = pose[row, 0] * local[0] + pose[row, 1] * local[1] + pose[row, 2] * local[2] + pose[row, 3]
 
 
 @njit(cache=True, nogil=True)
-def _pair_depth(world, bounding, placed, poses, centre, first, second, margin):  # type: ignore[no-untyped-def]
+def _pair_depth(
+    world: World,
+    bounding: BoundingSpheres,
+    placed: Array,
+    poses: Array,
+    centre: Array,
+    first: int,
+    second: int,
+    margin: float,
+) -> float:
     """Returns the depth of the first body's deepest sphere in the second body inflated by `margin` [m]."""
     deepest = 0.0
     second_radius = world.spheres[second, 3]
@@ -95,7 +104,7 @@ def _pair_depth(world, bounding, placed, poses, centre, first, second, margin): 
 
 
 @njit(cache=True, nogil=True)
-def penetrations(world, bounding, states):  # type: ignore[no-untyped-def]
+def penetrations(world: World, bounding: BoundingSpheres, states: Array) -> Array:
     """Returns the penetration cost of states, summed over the touching pairs; shape (n,) [m].
 
     Args:

@@ -5,18 +5,22 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD
+from modular_framework_planning.geometry.spatial import Array
 
 
 @njit(cache=True, nogil=True)
-def joint_lengths(placements):  # type: ignore[no-untyped-def]
+def joint_lengths(placements: Array) -> Array:
     """Returns the distance of each joint, at position zero, from its parent joint; shape (joints,) [m]."""
     return np.sqrt((placements[:, :, 3] ** 2).sum(axis=1))
 
 
 @njit(cache=True, nogil=True)
-def body_reaches(parents, placements, joints, poses, spheres):  # type: ignore[no-untyped-def]
+def body_reaches(
+    parents: NDArray[np.int64], placements: Array, joints: NDArray[np.int64], poses: Array, spheres: Array
+) -> Array:
     """Returns the distance along the kinematic chain from each joint to the farthest point of its bodies [m].
 
     Prismatic joints are at zero. Unbounded bodies, such as planes, are left out.
@@ -45,7 +49,7 @@ def body_reaches(parents, placements, joints, poses, spheres):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True)
-def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
+def _common_joint(parents: NDArray[np.int64], first: int, second: int) -> int:
     """Returns the last joint that moves both joints, -1 for none."""
     while first != second:  # parents come before children
         if first > second:
@@ -56,7 +60,7 @@ def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def common_joints(pairs, joints, parents):  # type: ignore[no-untyped-def]
+def common_joints(pairs: NDArray[np.int64], joints: NDArray[np.int64], parents: NDArray[np.int64]) -> NDArray[np.int64]:
     """Returns the last joint that moves both bodies of each pair, -1 for none and for field pairs; shape (p,).
 
     Args:

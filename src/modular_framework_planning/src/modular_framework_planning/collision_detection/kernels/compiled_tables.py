@@ -5,23 +5,26 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
     NEAR,
     TABLE_CELLS,
     UNKNOWN,
+    World,
     place_bodies,
     relative_pose,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import Rotations, surfaces_stay_apart
+from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
 MAX_CELLS = 12  # looked up per stretch of a path
 
 
 @njit(cache=True, nogil=True)
-def _fill_cell(world, table, pair, row, column):  # type: ignore[no-untyped-def]
+def _fill_cell(world: World, table: int, pair: int, row: int, column: int) -> None:
     """Determines whether two links stay apart in a whole cell of their table."""
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     if world.joints[first] < world.joints[second]:
@@ -64,7 +67,7 @@ def _fill_cell(world, table, pair, row, column):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _cells(joint_ranges, joint):  # type: ignore[no-untyped-def]
+def _cells(joint_ranges: Array, joint: int) -> tuple[int, int]:
     """Returns the first cell in a joint's range, and the number of cells; `joint_ranges` as in table_verdict."""
     if joint < 0:
         return 0, 1
@@ -74,7 +77,7 @@ def _cells(joint_ranges, joint):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def table_verdict(tables, table, joints, joint_ranges):  # type: ignore[no-untyped-def]
+def table_verdict(tables: NDArray[np.int8], table: int, joints: NDArray[np.int64], joint_ranges: Array) -> int:
     """Returns the verdict of a table on its links while the joints stay within their ranges.
 
     APART is certain. NEAR can also mean too many cells to look up; UNKNOWN means that a cell is not yet filled.
@@ -97,8 +100,14 @@ def table_verdict(tables, table, joints, joint_ranges):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def fill_cells(world, pair, joint_ranges):  # type: ignore[no-untyped-def]
-    """Fills the unknown cells of a pair's table within the joint ranges, see table_verdict."""
+def fill_cells(world: World, pair: int, joint_ranges: Array) -> None:
+    """Fills the unknown cells of a pair's table within joint ranges; see table_verdict.
+
+    Args:
+        world: Bodies, pairs and tables.
+        pair: Index of the pair.
+        joint_ranges: Minimum and maximum joint positions, shape (2, joints) [rad or m].
+    """
     table = world.table_of[pair]
     row, rows = _cells(joint_ranges, world.table_joints[table, 0])
     column, columns = _cells(joint_ranges, world.table_joints[table, 1])

@@ -25,7 +25,7 @@ class Surfaces(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def cut_long_edges(triangles, max_edge):  # type: ignore[no-untyped-def]
+def cut_long_edges(triangles: Array, max_edge: float) -> Array:
     """Halves triangles (m, 9) until no edge exceeds `max_edge` [m]; spheres fit long triangles badly."""
     result = np.empty((2 * len(triangles) + 16, 9))
     stack = np.empty((64, 9))
@@ -48,7 +48,7 @@ def cut_long_edges(triangles, max_edge):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def halve_longest_edge(pieces, index, max_squared):  # type: ignore[no-untyped-def]
+def halve_longest_edge(pieces: Array, index: int, max_squared: float) -> bool:
     """Splits a triangle at the middle of its longest edge.
 
     Args:
@@ -77,7 +77,7 @@ def halve_longest_edge(pieces, index, max_squared):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True)
-def build_sphere_tree(triangles):  # type: ignore[no-untyped-def]
+def build_sphere_tree(triangles: Array) -> tuple[Array, Array, NDArray[np.int32]]:
     """Builds a binary tree whose nodes enclose triangles by a sphere and by a box.
 
     Args:
@@ -115,7 +115,7 @@ def build_sphere_tree(triangles):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _split(triangles, members):  # type: ignore[no-untyped-def]
+def _split(triangles: Array, members: NDArray[np.int64]) -> int:
     """Partitions the members at the middle of their widest axis and returns the size of the first part."""
     widest, extent, middle = 0, -1.0, 0.0
     for axis in range(3):
@@ -135,7 +135,7 @@ def _split(triangles, members):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _fit_sphere(triangles, members, sphere):  # type: ignore[no-untyped-def]
+def _fit_sphere(triangles: Array, members: NDArray[np.int64], sphere: Array) -> None:
     """Writes a small bounding sphere of the members (Badoiu and Clarkson: steps towards the farthest vertex)."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for member in members:
@@ -165,7 +165,7 @@ def _fit_sphere(triangles, members, sphere):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _fit_box(triangles, members, box):  # type: ignore[no-untyped-def]
+def _fit_box(triangles: Array, members: NDArray[np.int64], box: Array) -> None:
     """Writes a bounding box of the members with an axis along their mean normal, since surface patches are flat."""
     nx, ny, nz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for member in members:
@@ -219,7 +219,7 @@ def _fit_box(triangles, members, box):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def triangle_distance(first, second):  # type: ignore[no-untyped-def]
+def triangle_distance(first: Array, second: Array) -> float:
     """Returns the distance of two triangles [m], 0 if they intersect; each has 9 coordinates."""
     best = min(_faces_distance(first, second), _faces_distance(second, first))
     if best <= 0.0:
@@ -231,7 +231,7 @@ def triangle_distance(first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _faces_distance(face, other):  # type: ignore[no-untyped-def]
+def _faces_distance(face: Array, other: Array) -> float:
     """Returns the squared distance of the vertices of `other` that project into `face`, 0 if an edge crosses `face`."""
     ux, uy, uz = face[3] - face[0], face[4] - face[1], face[5] - face[2]
     vx, vy, vz = face[6] - face[0], face[7] - face[1], face[8] - face[2]
@@ -270,7 +270,7 @@ def _faces_distance(face, other):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _projects_inside(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
+def _projects_inside(face: Array, nx: float, ny: float, nz: float, x: float, y: float, z: float) -> bool:
     """Returns whether the point (x, y, z) projects into the face with normal (nx, ny, nz)."""
     for vertex in range(3):
         p, q = 3 * vertex, 3 * ((vertex + 1) % 3)
@@ -282,7 +282,7 @@ def _projects_inside(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
+def _edge_distance(first: Array, edge: int, second: Array, other: int) -> float:
     """Returns the squared distance between an edge of the first triangle and an edge of the second."""
     p, q, r, s = 3 * edge, 3 * ((edge + 1) % 3), 3 * other, 3 * ((other + 1) % 3)
     ax, ay, az = first[q] - first[p], first[q + 1] - first[p + 1], first[q + 2] - first[p + 2]
@@ -304,8 +304,16 @@ def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def encloses(surface, root, x, y, z):  # type: ignore[no-untyped-def]
-    """Returns whether a closed surface contains the point (x, y, z): a ray then exits more often than it enters."""
+def encloses(surface: Surfaces, root: int, x: float, y: float, z: float) -> bool:
+    """Returns whether a closed surface contains a point: a ray then exits more often than it enters.
+
+    Args:
+        surface: Trees with the surface.
+        root: Root of the surface's tree.
+        x: Coordinate of the point in the surface's frame [m].
+        y: Coordinate of the point in the surface's frame [m].
+        z: Coordinate of the point in the surface's frame [m].
+    """
     spheres, children, triangles = surface.spheres, surface.children, surface.triangles
     dx, dy, dz = RAY
     stack = np.empty(512, np.int32)
@@ -329,7 +337,7 @@ def encloses(surface, root, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _crossing(t, x, y, z):  # type: ignore[no-untyped-def]
+def _crossing(t: Array, x: float, y: float, z: float) -> int:
     """Returns 1 if the ray from (x, y, z) exits through the triangle's front, -1 if it enters, else 0."""
     dx, dy, dz = RAY
     ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]

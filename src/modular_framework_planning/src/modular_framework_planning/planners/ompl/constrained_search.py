@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from modular_framework_planning.constraints.compiled_constraints import nearest_state
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 
@@ -55,7 +54,7 @@ class _Tree:
 
     def nearest(self, values: Array) -> int:
         """Returns the index of the vertex nearest to a joint vector."""
-        return int(nearest_state(self.values, values))
+        return int(np.square(self.values - values).sum(axis=1).argmin())
 
     def branch(self, index: int) -> Array:
         """Returns the vertices from the root to a vertex."""

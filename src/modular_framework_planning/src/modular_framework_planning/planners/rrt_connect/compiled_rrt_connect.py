@@ -17,14 +17,14 @@ undecided, and regularly to read the clock.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
-from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, world_of
 from modular_framework_planning.collision_detection.kernels.compiled_edges import (
     FREE,
     UNKNOWN,
@@ -32,7 +32,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_edges impor
     check_edge,
     new_edge,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_paths import new_workspace, release
+from modular_framework_planning.collision_detection.kernels.compiled_paths import (
+    Samples,
+    Workspace,
+    new_workspace,
+    release,
+)
 from modular_framework_planning.geometry.spatial import Array
 
 # Return values of `grow`
@@ -87,7 +92,7 @@ class Space(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _squared_distance(first, second, weights):  # type: ignore[no-untyped-def]
+def _squared_distance(first: Array, second: Array, weights: Array) -> float:
     length = 0.0
     for joint in range(len(first)):
         gap = weights[joint] * (second[joint] - first[joint])
@@ -96,7 +101,9 @@ def _squared_distance(first, second, weights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _nearest(states, lengths, tree, size, target, weights, max_length):  # type: ignore[no-untyped-def]
+def _nearest(
+    states: Array, lengths: Array, tree: int, size: int, target: Array, weights: Array, max_length: float
+) -> int:
     """Returns the index of the tree's state nearest to a joint vector.
 
     Only states whose path from the root to the joint vector is no longer than `max_length` qualify; -1 if none does.
@@ -113,7 +120,9 @@ def _nearest(states, lengths, tree, size, target, weights, max_length):  # type:
 
 
 @njit(cache=True, nogil=True)
-def _distance_to_root(states, parents, tree, size, target, weights):  # type: ignore[no-untyped-def]
+def _distance_to_root(
+    states: Array, parents: NDArray[np.int64], tree: int, size: int, target: Array, weights: Array
+) -> float:
     """Returns the weighted distance from a joint vector to the nearest root of a tree."""
     best = np.inf
     for index in range(size):
@@ -124,7 +133,7 @@ def _distance_to_root(states, parents, tree, size, target, weights):  # type: ig
 
 
 @njit(cache=True, nogil=True)
-def _max_length_to_sample(trees, space, tree, sample):  # type: ignore[no-untyped-def]
+def _max_length_to_sample(trees: Trees, space: Space, tree: int, sample: Array) -> float:
     """Returns the maximum path length from the root of a tree to a sample; -1 if every path through it is too long.
 
     The sample's last value, from 0 to 1, interpolates between the straight distance and the length the bound leaves.
@@ -139,7 +148,7 @@ def _max_length_to_sample(trees, space, tree, sample):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True)
-def write_step(start, target, space, out):  # type: ignore[no-untyped-def]
+def write_step(start: Array, target: Array, space: Space, out: Array) -> bool:
     """Writes the end of an extension towards a target, at most `max_extension` away from the start.
 
     Args:
@@ -159,7 +168,7 @@ def write_step(start, target, space, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def]
+def grow(trees: Trees, space: Space, samples: Array, verdict: int, *world: NDArray[Any]) -> int:
     """Grows the trees until they meet.
 
     Args:
@@ -184,7 +193,9 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: ignore[no-untyped-def]
+def _grow(
+    trees: Trees, space: Space, samples: Array, verdict: int, world: World, edge: Samples, workspace: Workspace
+) -> int:
     """Implements `grow` with preallocated working memory; arrays are passed without owner (see `borrowed`)."""
     states, parents, blocked, lengths, sizes, cursor, target, counts = trees
     state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
