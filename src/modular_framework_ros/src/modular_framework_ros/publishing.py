@@ -59,7 +59,13 @@ class PicturePublisher(rospy.SubscribeListener):
                 self._draw = draw
 
     def peer_subscribe(self, _topic: str, _publish: Any, _peer_publish: Any) -> None:
-        """Called by rospy before the latched message is sent to a new subscriber."""
+        """Creates the message before rospy sends the latched message to a new subscriber.
+
+        Args:
+            _topic: Name of the topic.
+            _publish: Function that publishes to all subscribers.
+            _peer_publish: Function that publishes to the new subscriber.
+        """
         with self._lock:
             if self._draw is not None:
                 self._publisher.impl.latch, self._draw = self._draw(), None
