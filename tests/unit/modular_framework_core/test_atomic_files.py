@@ -22,7 +22,8 @@ from modular_framework_core.managers.message_numbers import position_fault
 from modular_framework_core.managers.named_joint_states import load_joint_states
 from modular_framework_core.srv import AddMoveitPlanRequest, AddStandardisedGraspRequest
 from modular_framework_core.task_constructor import generator
-from modular_framework_core.task_runner.record import StateRecord, write_record
+from modular_framework_core.task_runner.record import StateRecord
+from modular_framework_core.task_runner.task_runner import TaskResult, write_record
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.sdf_specs import Mesh
@@ -75,7 +76,7 @@ def test_a_state_machine_that_cannot_be_written_leaves_nothing_and_is_named(tmp_
 def test_a_record_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
     record = StateRecord("A" * 200, 0.0)
     with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick_.*json'"), full_disk():
-        write_record(tmp_path, "pick", 0.0, "done", True, "", (record,))
+        write_record(tmp_path, 0.0, TaskResult("pick", "done", 0), (record,))
     assert left_in(tmp_path) == []
 
 

@@ -14,7 +14,7 @@ import roslaunch.rlutil
 import rospkg
 
 from modular_framework_core.launching.launch_arguments import check_arguments
-from modular_framework_core.launching.launch_runner import EXIT_BAD_LAUNCH, run_launch_file
+from modular_framework_core.launching.launch_runner import EXIT_BAD_LAUNCH, LaunchSpec, run_launch
 
 API = "modular_framework_api"
 
@@ -114,7 +114,7 @@ def test_a_robot_that_xacro_cannot_expand_ends_with_one_sentence(
         '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
     )
     file = f"{'../' * 20}{tmp_path}/bad.xacro"
-    code = run_launch_file(API, "start_framework.launch", [f"robot_urdf_file:={file}"], "task")
+    code = run_launch(LaunchSpec(API, "start_framework.launch", [f"robot_urdf_file:={file}"]), task_name="task")
     last = capfd.readouterr().err.splitlines()[-1]
     assert code == EXIT_BAD_LAUNCH
     assert last.startswith(f"run_framework: argument 'robot_urdf_file' is '{file}', which xacro cannot expand")

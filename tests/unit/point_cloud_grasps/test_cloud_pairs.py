@@ -18,7 +18,9 @@ CONE_RAD = math.atan(SETTINGS.friction)
 
 def pairs_of(surface: Surface, widest: float = 0.2, seed: int = 1) -> FoundPairs:
     generator = np.random.default_rng(seed)
-    return sample_pairs(surface.points, surface.normals, surface.centroid, widest, SETTINGS, generator)
+    return sample_pairs(
+        surface.points, surface.normals, surface.centroid, widest, settings=SETTINGS, generator=generator
+    )
 
 
 def test_contacts_of_a_box_are_on_opposite_faces_within_the_cone() -> None:
@@ -66,7 +68,9 @@ def test_no_pair_is_wider_than_allowed_and_the_narrowest_is_reported() -> None:
 def test_a_single_face_has_no_pairs() -> None:
     box = surface_points.box((0.1, 0.1, 0.02))
     top = box.normals[:, 2] > 0.5
-    found = sample_pairs(box.points[top], box.normals[top], box.centroid, 1.0, SETTINGS, np.random.default_rng(1))
+    found = sample_pairs(
+        box.points[top], box.normals[top], box.centroid, 1.0, settings=SETTINGS, generator=np.random.default_rng(1)
+    )
     assert found == FoundPairs([], math.inf)
 
 

@@ -180,7 +180,12 @@ def _pairs(
     known = shape.unseen_m <= gripper.pad_half_height
     widest = settings.widest(gripper)
     found = sample_pairs(
-        surface.points[known], surface.normals[known], surface.centroid, widest, settings.pairs, generator
+        surface.points[known],
+        surface.normals[known],
+        surface.centroid,
+        widest,
+        settings=settings.pairs,
+        generator=generator,
     )
     if found.pairs:
         return found.pairs

@@ -48,6 +48,7 @@ def sample_pairs(
     normals: Array,
     centroid: Array,
     max_width: float,
+    *,
     settings: CloudPairSettings,
     generator: np.random.Generator,
 ) -> FoundPairs:

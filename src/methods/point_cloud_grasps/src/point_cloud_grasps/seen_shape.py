@@ -80,7 +80,8 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     kept = positions[:, 2] >= support_z
     edges = np.where(tops > support_z, tops, ndimage.maximum_filter(tops, 3))
     unseen = np.maximum(0.0, edges[border[:, 0], border[:, 1]] - positions[:, 2])
-    return SeenShape(_surface(positions[kept], normals[kept], filled, cell, offsets, support_z), unseen[kept])
+    volume, centroid = _solid(filled, cell, offsets, support_z)
+    return SeenShape(Surface(positions[kept], normals[kept], volume, centroid, np.zeros((0, 3))), unseen[kept])
 
 
 def _column_tops(points: Array, radius: float, cell: float, support_z: float) -> tuple[Array, Array]:
@@ -113,9 +114,10 @@ def _standard_quantile(probability: Array) -> Array:
     return np.asarray(ndtri(np.clip(probability, 1e-3, 1.0 - 1e-3)))
 
 
-def _surface(points: Array, normals: Array, filled: Array, cell: float, offsets: Array, support_z: float) -> Surface:
+def _solid(filled: Array, cell: float, offsets: Array, support_z: float) -> tuple[float, Array]:
+    """Returns the volume [m^3] and the centroid (3,) [m] of the cells above the support."""
     above = filled.copy()
     above[:, :, (np.arange(filled.shape[2]) * cell + offsets[2]) < support_z] = 0.0
     weight = float(above.sum())
     centroid = np.array([above.sum(axis=tuple({0, 1, 2} - {axis})) @ np.arange(above.shape[axis]) for axis in range(3)])
-    return Surface(points, normals, weight * cell**3, centroid / weight * cell + offsets, np.zeros((0, 3)))
+    return weight * cell**3, centroid / weight * cell + offsets

@@ -94,15 +94,9 @@ def top_down_grasps(
     grasps = []
     top = highest_points(surface.points)
     for yaw in _directions(surface, settings.yaw_step_rad):
-        closing = np.array([math.cos(yaw), math.sin(yaw)])
-        across = np.array([math.sin(yaw), -math.cos(yaw)])
-        x, y = surface.points[:, :2] @ closing, surface.points[:, :2] @ across
-        facing = surface.normals[:, :2] @ closing
-        flat = _Slice(
-            x, y, surface.points[:, 2], facing, np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]])
-        )
-        for y_grasp in _grasp_positions(y, float(surface.centroid[:2] @ across), settings.position_step_m):
-            grasp = _grasp_at(flat, y_grasp, yaw, surface, support_z, gripper, settings)
+        flat = _Slice.along(yaw, surface, top)
+        for y_grasp in _grasp_positions(flat.y, flat.centroid[1], settings.position_step_m):
+            grasp = _grasp_at(flat, y_grasp, support_z, gripper, settings)
             if grasp is not None:
                 grasps.append(grasp)
     return sorted(grasps, key=lambda grasp: -grasp.quality)
@@ -113,15 +107,40 @@ class _Slice:
     """Surface points in the axes of the hand: x closing, y across, z up.
 
     Attributes:
+        yaw: Closing direction as an angle about world z [rad].
         facing: Component of each normal along x.
         top: Highest points, shape (n, 3).
+        centroid: Centre of mass of the object (x, y, z).
     """
 
+    yaw: float
     x: Array
     y: Array
     z: Array
     facing: Array
     top: Array
+    centroid: tuple[float, float, float]
+
+    @classmethod
+    def along(cls, yaw: float, surface: Surface, top: Array) -> _Slice:
+        """Turns the surface and its highest points (n, 3) into the axes of a closing direction."""
+        closing = np.array([math.cos(yaw), math.sin(yaw)])
+        across = np.array([math.sin(yaw), -math.cos(yaw)])
+        x, y = surface.points[:, :2] @ closing, surface.points[:, :2] @ across
+        centroid = float(surface.centroid[:2] @ closing), float(surface.centroid[:2] @ across)
+        return cls(
+            yaw=yaw,
+            x=x,
+            y=y,
+            z=surface.points[:, 2],
+            facing=surface.normals[:, :2] @ closing,
+            top=np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]]),
+            centroid=(*centroid, float(surface.centroid[2])),
+        )
+
+    def in_world(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Returns a point of these axes in the world."""
+        return x * math.cos(self.yaw) + y * math.sin(self.yaw), x * math.sin(self.yaw) - y * math.cos(self.yaw), z
 
     def top_around(self, x: float, y: float) -> Array:
         """Returns the highest points relative to a point in the plane."""
@@ -150,18 +169,9 @@ def _grasp_positions(y: Array, centre: float, step: float) -> Iterable[float]:
 
 
 def _grasp_at(
-    flat: _Slice,
-    y_grasp: float,
-    yaw: float,
-    surface: Surface,
-    support_z: float,
-    gripper: GripperGeometry,
-    settings: TopDownSettings,
+    flat: _Slice, y_grasp: float, support_z: float, gripper: GripperGeometry, settings: TopDownSettings
 ) -> TopDownGrasp | None:
-    between = np.abs(flat.y - y_grasp) <= gripper.pad_half_width
-    if not between.any():
-        return None
-    hold = _highest_hold(flat, y_grasp, between, float(surface.centroid[2]), support_z, gripper, settings)
+    hold = _highest_hold(flat, y_grasp, support_z, gripper, settings)
     if hold is None:
         return None
     alignment = min(
@@ -170,19 +180,17 @@ def _grasp_at(
     )
     if alignment < settings.min_side_alignment:
         return None
-    closing, across = (math.cos(yaw), math.sin(yaw)), (math.sin(yaw), -math.cos(yaw))
     middle = (hold.low + hold.high) / 2
-    position = (middle * closing[0] + y_grasp * across[0], middle * closing[1] + y_grasp * across[1], hold.z)
-    offset = math.dist((position[0], position[1], hold.pad_z), tuple(surface.centroid))
+    position = flat.in_world(middle, y_grasp, hold.z)
     quality = _quality(
-        alignment,
-        offset,
-        (gripper.max_opening - hold.opening) / gripper.max_opening,
-        hold.overlap / (2 * gripper.pad_half_height),
-        position,
-        settings,
+        alignment=alignment,
+        offset_m=math.dist((middle, y_grasp, hold.pad_z), flat.centroid),
+        clearance=(gripper.max_opening - hold.opening) / gripper.max_opening,
+        overlap=hold.overlap / (2 * gripper.pad_half_height),
+        position=position,
+        settings=settings,
     )
-    return TopDownGrasp(position, yaw, hold.high - hold.low, gripper.position_for(hold.opening), quality)
+    return TopDownGrasp(position, flat.yaw, hold.high - hold.low, gripper.position_for(hold.opening), quality)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,22 +216,19 @@ class _Hold:
 
 
 def _highest_hold(
-    flat: _Slice,
-    y_grasp: float,
-    between: npt.NDArray[np.bool_],
-    centroid_z: float,
-    support_z: float,
-    gripper: GripperGeometry,
-    settings: TopDownSettings,
+    flat: _Slice, y_grasp: float, support_z: float, gripper: GripperGeometry, settings: TopDownSettings
 ) -> _Hold | None:
     """Raises the hand from the height of the centre of mass until it is clear of the object.
 
     The required opening depends on the height and vice versa; since the hand only moves up, a few iterations converge.
     """
+    between = np.abs(flat.y - y_grasp) <= gripper.pad_half_width
+    if not between.any():
+        return None
     pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
     top = float(flat.z[np.abs(flat.y - y_grasp) <= gripper.pad_half_width + 0.01].max())
     z = max(
-        min(centroid_z, top - gripper.pad_half_height / 2) + pad_offset,
+        min(flat.centroid[2], top - gripper.pad_half_height / 2) + pad_offset,
         support_z + gripper.max_tip + settings.tip_clearance_m,
     )
     for _ in range(HEIGHT_ROUNDS):
@@ -239,7 +244,7 @@ def _highest_hold(
         lowest, opening = lowest_height(flat.top_around(passage.middle, y_grasp), passage, z, gripper)
         if lowest <= z + HEIGHT_TOLERANCE_M:
             low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
-            return _Hold(z, pad_z, low, high, overlap, opening, touching)
+            return _Hold(z, pad_z, low, high, overlap=overlap, opening=opening, touching=touching)
         z = lowest
     return None
 
@@ -252,6 +257,7 @@ def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:
 
 
 def _quality(
+    *,
     alignment: float,
     offset_m: float,
     clearance: float,

@@ -12,10 +12,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from modular_framework_core.launching.launch_runner import run_launch_file
+from modular_framework_core.launching.launch_runner import LaunchSpec, run_launch
 
 if __name__ == "__main__":
     package, launch_file, parameters, *arguments = sys.argv[1:]
+    spec = LaunchSpec(package, launch_file, arguments, later_files=[Path(parameters)])
     # The task waits for its start and does not end, so the end of its node counts as a death.
-    later_files = [Path(parameters)]
-    sys.exit(run_launch_file(package, launch_file, arguments, "", later_files, leaves_nodes=True))
+    sys.exit(run_launch(spec, task_name="", leaves_nodes=True))

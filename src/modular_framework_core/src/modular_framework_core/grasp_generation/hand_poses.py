@@ -98,6 +98,7 @@ def place_hand(
     axes: Array,
     surface: Surface,
     support_z: float,
+    *,
     gripper: GripperGeometry,
     settings: HandSettings,
 ) -> HandPose | None:
@@ -123,18 +124,18 @@ def place_hand(
     farthest = pad_offset + gripper.pad_half_height - settings.min_pad_overlap_m / 2
     height = pad_offset
     for _ in range(HEIGHT_ROUNDS):
-        hold = _hold_at(view, height, pad_offset, gripper, settings)
+        hold = view.hold_at(height, pad_offset)
         if hold is None:
             return None
         needed = 2 * (hold.passage.half_width + hold.passage.clearance)
-        if _height_over_support(pair, axes, hold, needed, support_z, gripper, settings) > farthest:
+        if view.height_over_support(hold, needed, support_z) > farthest:
             return None
         lowest, opening = lowest_height(view.top - [hold.passage.middle, 0.0, 0.0], hold.passage, height, gripper)
-        lowest = max(lowest, _height_over_support(pair, axes, hold, opening, support_z, gripper, settings))
+        lowest = max(lowest, view.height_over_support(hold, opening, support_z))
         if lowest > farthest:
             return None
         if lowest <= height + HEIGHT_TOLERANCE_M:
-            return _pose(pair, axes, height, opening, hold, settings)
+            return view.pose(hold, height, opening)
         height = lowest
     return None
 
@@ -144,14 +145,22 @@ class _View:
     """The object as the hand sees it, from the middle of the pair: x closing, y across, z against the approach.
 
     Attributes:
+        pair: Where the pads are to touch.
+        axes: (3, 3) axes of the hand in the world, as columns: closing, across and approach.
         points: (n, 3) points that can come between the pads [m].
         normals: (n, 3) outward normals there.
         top: (m, 3) of all points, those that the hand meets first [m].
+        gripper: Geometry of the hand.
+        settings: What counts as usable.
     """
 
+    pair: ContactPair
+    axes: Array
     points: Array
     normals: Array
     top: Array
+    gripper: GripperGeometry
+    settings: HandSettings
 
     @classmethod
     def along(
@@ -162,7 +171,64 @@ class _View:
         between = (np.abs(points[:, 1]) <= gripper.pad_half_width) & (
             np.abs(points[:, 0]) <= pair.width / 2 + settings.finger_clearance_m
         )
-        return cls(points[between], surface.normals[between] @ frame, highest_points(points) * [1.0, -1.0, 1.0])
+        return cls(
+            pair=pair,
+            axes=axes,
+            points=points[between],
+            normals=surface.normals[between] @ frame,
+            top=highest_points(points) * [1.0, -1.0, 1.0],
+            gripper=gripper,
+            settings=settings,
+        )
+
+    def hold_at(self, height: float, pad_offset: float) -> _Hold | None:
+        pad_z = height - pad_offset
+        points, gripper, settings = self.points, self.gripper, self.settings
+        touching = np.abs(points[:, 2] - pad_z) <= gripper.pad_half_height
+        if not touching.any():
+            return None
+        x = points[touching, 0]
+        sides = [
+            _side(points[touching], self.normals[touching], x <= x.min() + CONTACT_DEPTH_M, -1.0),
+            _side(points[touching], self.normals[touching], x >= x.max() - CONTACT_DEPTH_M, 1.0),
+        ]
+        if sides[0] is None or sides[1] is None:
+            return None
+        (low, low_normal), (high, high_normal) = sides[0], sides[1]
+        line = (high - low) / np.linalg.norm(high - low)
+        alignment = min(float(-low_normal @ line), float(high_normal @ line))
+        z = points[touching, 2]
+        overlap = float(z.max() - z.min())
+        if alignment < settings.cone_cosine or overlap < settings.min_pad_overlap_m:
+            return None
+        passed = points[points[:, 2] >= pad_z - gripper.pad_half_height, 0]
+        passage = passage_between(x, passed, gripper, settings)
+        return None if passage is None else _Hold(low, high, alignment, overlap, passage)
+
+    def height_over_support(self, hold: _Hold, opening: float, support_z: float) -> float:
+        """Returns the least height of the grasp frame, against the approach, at which it keeps off the support [m]."""
+        gripper, axes = self.gripper, self.axes
+        samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
+        samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
+        reach = min(float((part.corners[samples] @ axes[2]).min()) for part in gripper.parts)
+        middle_z = float(self.pair.middle[2] + hold.passage.middle * axes[2, 0])
+        missing = support_z + self.settings.tip_clearance_m - (middle_z + reach)
+        lift = -float(axes[2, 2])
+        if lift > LEVEL:
+            return missing / lift
+        return -math.inf if missing + max(0.0, -lift) * gripper.max_tip <= 0.0 else math.inf
+
+    def pose(self, hold: _Hold, height: float, opening: float) -> HandPose:
+        frame = self.axes * [1.0, -1.0, -1.0]
+        return HandPose(
+            position=self.pair.middle + frame @ [hold.passage.middle, 0.0, height],
+            axes=self.axes,
+            contacts=self.pair.middle + np.array([hold.low, hold.high]) @ frame.T,
+            alignment=hold.alignment,
+            width=hold.passage.width,
+            opening=opening,
+            overlap=hold.overlap,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,33 +242,6 @@ class _Hold:
     passage: Passage
 
 
-def _hold_at(
-    view: _View, height: float, pad_offset: float, gripper: GripperGeometry, settings: HandSettings
-) -> _Hold | None:
-    pad_z = height - pad_offset
-    points = view.points
-    touching = np.abs(points[:, 2] - pad_z) <= gripper.pad_half_height
-    if not touching.any():
-        return None
-    x = points[touching, 0]
-    sides = [
-        _side(points[touching], view.normals[touching], x <= x.min() + CONTACT_DEPTH_M, -1.0),
-        _side(points[touching], view.normals[touching], x >= x.max() - CONTACT_DEPTH_M, 1.0),
-    ]
-    if sides[0] is None or sides[1] is None:
-        return None
-    (low, low_normal), (high, high_normal) = sides[0], sides[1]
-    line = (high - low) / np.linalg.norm(high - low)
-    alignment = min(float(-low_normal @ line), float(high_normal @ line))
-    z = points[touching, 2]
-    overlap = float(z.max() - z.min())
-    if alignment < settings.cone_cosine or overlap < settings.min_pad_overlap_m:
-        return None
-    passed = points[points[:, 2] >= pad_z - gripper.pad_half_height, 0]
-    passage = passage_between(x, passed, gripper, settings)
-    return None if passage is None else _Hold(low, high, alignment, overlap, passage)
-
-
 def _side(points: Array, normals: Array, outermost: npt.NDArray[np.bool_], sign: float) -> tuple[Array, Array] | None:
     """Returns the centre and the mean normal of the outermost points of a side that face the pad."""
     facing = outermost & (sign * normals[:, 0] > LEAST_FACING)
@@ -211,32 +250,3 @@ def _side(points: Array, normals: Array, outermost: npt.NDArray[np.bool_], sign:
     normal = normals[facing].mean(axis=0)
     low, high = points[facing].min(axis=0), points[facing].max(axis=0)
     return (low + high) / 2, normal / np.linalg.norm(normal)
-
-
-def _height_over_support(
-    pair: ContactPair,
-    axes: Array,
-    hold: _Hold,
-    opening: float,
-    support_z: float,
-    gripper: GripperGeometry,
-    settings: HandSettings,
-) -> float:
-    """Returns the least height of the grasp frame, against the approach, at which it keeps off the support [m]."""
-    samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
-    samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
-    reach = min(float((part.corners[samples] @ axes[2]).min()) for part in gripper.parts)
-    missing = support_z + settings.tip_clearance_m - (float(pair.middle[2] + hold.passage.middle * axes[2, 0]) + reach)
-    lift = -float(axes[2, 2])
-    if lift > LEVEL:
-        return missing / lift
-    return -math.inf if missing + max(0.0, -lift) * gripper.max_tip <= 0.0 else math.inf
-
-
-def _pose(
-    pair: ContactPair, axes: Array, height: float, opening: float, hold: _Hold, settings: HandSettings
-) -> HandPose:
-    frame = axes * [1.0, -1.0, -1.0]
-    position = pair.middle + frame @ [hold.passage.middle, 0.0, height]
-    contacts = pair.middle + np.array([hold.low, hold.high]) @ frame.T
-    return HandPose(position, axes, contacts, hold.alignment, hold.passage.width, opening, hold.overlap)

@@ -90,7 +90,9 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
     surroundings = ObstacleClearance(query.obstacles, query.gripper, settings.full_clearance_m)
     grasps: list[PairGrasp] = []
     for pair, axes in itertools.islice(_poses_to_try(pairs, query, settings), settings.max_poses):
-        pose = place_hand(pair, axes, query.target.surface, query.support_z, query.gripper, settings.hand)
+        pose = place_hand(
+            pair, axes, query.target.surface, query.support_z, gripper=query.gripper, settings=settings.hand
+        )
         if pose is None:
             continue
         clearance = surroundings.of_grasp(

@@ -65,7 +65,7 @@ def generate_pose_stamped_message(
     return message
 
 
-def get_standardised_grasp(
+def get_standardised_grasp(  # noqa: PLR0913, PLR0917 - the original framework's signature, also in C++
     manipulator_joint_names: Sequence[str],
     pregrasp_joint_values: Sequence[float],
     grasp_joint_values: Sequence[float],

@@ -81,23 +81,35 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             self.parent.pm.is_shutdown = True
 
 
-def run_launch_file(
-    package: str,
-    launch_file: str,
-    arguments: list[str],
+@dataclass(frozen=True, slots=True)
+class LaunchSpec:
+    """A launch file with its arguments.
+
+    Attributes:
+        package: ROS package of the launch file; "" for a path.
+        launch_file: File name in the package's folder `launch`, or path.
+        arguments: Launch arguments, `name:=value`. The launch file must have the argument `end_with_task`.
+        later_files: Launch files loaded afterwards, whose parameters override those of the launch file.
+    """
+
+    package: str
+    launch_file: str
+    arguments: list[str]
+    later_files: Sequence[Path] = ()
+
+
+def run_launch(
+    spec: LaunchSpec,
+    *,
     task_name: str,
-    later_files: Sequence[Path] = (),
     leaves_nodes: bool = False,
     faults: Callable[[str, list[str]], Sequence[str]] = lambda path, arguments: (),
 ) -> int:
     """Runs a launch file until its task ends or a node dies, and prints the reason at the end.
 
     Args:
-        package: ROS package of the launch file; "" for a path.
-        launch_file: File name in the package's folder `launch`, or path.
-        arguments: Launch arguments, `name:=value`. The launch file must have the argument `end_with_task`.
+        spec: Launch file with its arguments.
         task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
-        later_files: Launch files loaded afterwards, whose parameters override those of the launch file.
         leaves_nodes: Whether to exit at once at the end, so that the caller must stop the remaining nodes.
         faults: Function that returns the faults of the names in a launch file and its arguments. Faults prevent the
             start.
@@ -106,9 +118,9 @@ def run_launch_file(
         The task's exit code, EXIT_NODE_DIED if another node died first, or EXIT_BAD_LAUNCH for an invalid launch file
         or argument.
     """
-    path = ""
+    path, arguments = "", spec.arguments
     try:
-        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, launch_file))])[0]
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (spec.package, spec.launch_file))])[0]
         check_arguments(path, arguments)
         texts = faults(path, arguments)
         if texts:
@@ -121,7 +133,7 @@ def run_launch_file(
         roslaunch.configure_logging(uuid)
         # The watcher ends the launch with the task; a required node would make roslaunch print its error banner.
         launch_arguments = [*arguments, "end_with_task:=false"]
-        files = [(path, launch_arguments), *((str(file), []) for file in later_files)]
+        files = [(path, launch_arguments), *((str(file), []) for file in spec.later_files)]
         parent = roslaunch.parent.ROSLaunchParent(
             uuid, files, process_listeners=[watcher], port=_master_port(), show_summary=False
         )

@@ -82,6 +82,7 @@ def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
 def request_to_spawn(
     name: str,
     object_type: str,
+    *,
     position_m: Sequence[float],
     rpy_rad: Sequence[float],
     reference_frame: str,

@@ -31,26 +31,30 @@ class ChildLinks:
     location: SourceLocation
 
 
-def check_sequential(
-    children: list[ChildLinks],
-    labels: list[str],
-    first: list[str],
-    outcomes: tuple[str, ...] | None,
-    location: SourceLocation,
-    faults: FaultList,
-) -> None:
-    """Checks the transitions between the children of a sequential machine.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineLinks:
+    """Links between the children of a sequential machine.
 
-    Args:
+    Attributes:
         children: Readable children.
         labels: Labels of all children as written, including unreadable children and repeated labels.
         first: List with the label of the initial state, or an empty list.
-        outcomes: Outcomes of the machine. If None (unreadable), targets are not checked.
+        outcomes: Outcomes of the machine; None if unreadable.
         location: Position of the outcomes.
-        faults: Receives the faults.
     """
-    targets = list(dict.fromkeys([*labels, *(outcomes or ())]))
-    for child in children:
+
+    children: list[ChildLinks]
+    labels: list[str]
+    first: list[str]
+    outcomes: tuple[str, ...] | None
+    location: SourceLocation
+
+
+def check_sequential(machine: MachineLinks, faults: FaultList) -> None:
+    """Checks the transitions of a sequential machine; without readable outcomes, targets are not checked."""
+    outcomes = machine.outcomes
+    targets = list(dict.fromkeys([*machine.labels, *(outcomes or ())]))
+    for child in machine.children:
         transitions = child.transitions or {}
         for outcome, target in transitions.items():
             if child.outcomes is not None and outcome not in child.outcomes:
@@ -69,35 +73,28 @@ def check_sequential(
                 f"state '{child.label}': no transition for {', '.join(map(repr, missing))}; "
                 f"add it to transitions, leading to one of: {', '.join(targets)}",
             )
-    if outcomes is not None and labels:
-        _check_reachability(children, labels, first, outcomes, location, faults)
+    if outcomes is not None and machine.labels:
+        _check_reachability(machine, outcomes, faults)
 
 
-def _check_reachability(
-    children: list[ChildLinks],
-    labels: list[str],
-    first: list[str],
-    outcomes: tuple[str, ...],
-    location: SourceLocation,
-    faults: FaultList,
-) -> None:
+def _check_reachability(machine: MachineLinks, outcomes: tuple[str, ...], faults: FaultList) -> None:
     """Adds faults for unreachable states, states without a path to an outcome, and unreachable outcomes.
 
     Other checks report faulty transitions. To avoid follow-up faults, a misspelt target counts as the closest name
     here, and a child with unknown links may lead to any state or outcome.
     """
-    anywhere = {*labels, *outcomes}
-    leads_to = {label: anywhere for label in labels}
-    for child in children:
-        if labels.count(child.label) == 1:
+    anywhere = {*machine.labels, *outcomes}
+    leads_to = {label: anywhere for label in machine.labels}
+    for child in machine.children:
+        if machine.labels.count(child.label) == 1:
             leads_to[child.label] = _targets(child, outcomes, anywhere)
-    reachable = _closure(leads_to, first)
+    reachable = _closure(leads_to, machine.first)
     predecessors: dict[str, set[str]] = {}
     for label, targets in leads_to.items():
         for target in targets:
             predecessors.setdefault(target, set()).add(label)
     can_end = _closure(predecessors, outcomes)
-    for child in children:
+    for child in machine.children:
         if child.label not in reachable:
             faults.add(
                 child.location,
@@ -110,7 +107,7 @@ def _check_reachability(
                 f"state '{child.label}' never leads to an outcome: its transitions only lead to {cycle}; "
                 f"add a transition to one of: {', '.join(outcomes)}",
             )
-    check_outcomes_produced(outcomes, set().union(*leads_to.values()), location, faults)
+    check_outcomes_produced(outcomes, set().union(*leads_to.values()), machine.location, faults)
 
 
 def _targets(child: ChildLinks, outcomes: tuple[str, ...], anywhere: set[str]) -> set[str]:

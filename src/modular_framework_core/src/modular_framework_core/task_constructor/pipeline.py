@@ -50,6 +50,7 @@ def construct_task(
     states_directories: Sequence[Path],
     templates_directories: Sequence[Path],
     output: Path,
+    *,
     known: KnownNames | None = None,
     file_name: str = "",
 ) -> tuple[TaskSpec, Path]:
@@ -114,7 +115,7 @@ def main(arguments: Sequence[str]) -> int:
             print(_checked(args, check_task(script, states, templates, known)))
         else:
             output = args.output or generator.default_output_directory()
-            print(construct_task(script, states, templates, output, known)[1])
+            print(construct_task(script, states, templates, output, known=known)[1])
     except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -120,7 +120,10 @@ class TaskBuilder:
             machine_checks.check_concurrent(links, self._faults)
         else:
             first = [initial_state] if initial_state else labels[:1]
-            machine_checks.check_sequential(links, labels, first, known_outcomes, outcomes_location, self._faults)
+            machine = machine_checks.MachineLinks(
+                children=links, labels=labels, first=first, outcomes=known_outcomes, location=outcomes_location
+            )
+            machine_checks.check_sequential(machine, self._faults)
         faults_before_map = len(self._faults)
         default_outcome = headers.default_outcome(header, template, outcomes)
         outcome_map = headers.outcome_map(header, template, outcomes, links)

@@ -90,28 +90,24 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
     for child, keys in needed:
         for key in dict.fromkeys(keys):
             if key not in available:
-                faults.add(child.location, _missing_key(machine, is_root, child, key, available, provided_by))
+                text = f"{_missing_key(machine, child, key, available)}; {_source(machine, is_root, key, provided_by)}"
+                faults.add(child.location, text)
 
 
-def _missing_key(
-    machine: MachineSpec,
-    is_root: bool,
-    child: ChildSpec,
-    key: str,
-    available: Iterable[str],
-    provided_by: dict[str, str],
-) -> str:
-    text = (
+def _missing_key(machine: MachineSpec, child: ChildSpec, key: str, available: Iterable[str]) -> str:
+    return (
         f"state '{child.label}' needs the userdata key '{key}', which the machine '{machine.label}' does not have; "
         f"{listing(sorted(available), 'it has none')}{nearest(key, sorted(available))}"
     )
+
+
+def _source(machine: MachineSpec, is_root: bool, key: str, provided_by: dict[str, str]) -> str:
+    """Returns where a missing key can come from."""
     if not is_root:
-        return (
-            f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the enclosing machine's keys"
-        )
+        return f"'userdata: self.userdata' in the header of '{machine.label}' shares the enclosing machine's keys"
     if key in provided_by:
-        return f"{text}; the template {provided_by[key]} provides it"
-    return f"{text}; name it in the output_keys of the state that writes it"
+        return f"the template {provided_by[key]} provides it"
+    return "name it in the output_keys of the state that writes it"
 
 
 def _userdata_users(machine: MachineSpec) -> Iterable[ChildSpec]:

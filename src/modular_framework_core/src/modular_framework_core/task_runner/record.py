@@ -3,17 +3,13 @@
 
 from __future__ import annotations
 
-import json
-import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import smach
-from modular_framework_core.files.atomic_files import write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,38 +200,3 @@ class TaskRecorder:
             reasons = [record.reason for record in executions if record.failed]
             summaries.append(FailureSummary(path, len(reasons), len(executions), reasons[-1], len(set(reasons))))
         return tuple(summaries)
-
-
-def write_record(
-    folder: Path, task: str, begun: float, outcome: str, succeeded: bool, error: str, records: tuple[StateRecord, ...]
-) -> Path:
-    """Writes the record of one run as JSON, for tools that compare runs.
-
-    The keys are ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``, a list of
-    ``StateRecord`` fields.
-
-    Args:
-        folder: Output folder; created if missing.
-        task: Name of the task.
-        begun: Start time of the task [s since 1970].
-        outcome: Outcome of the task.
-        succeeded: Whether the outcome is the task's success outcome.
-        error: Error outside of the states' own reasons; "" without an error.
-        records: Records of the state executions.
-
-    Returns:
-        The path of the file, ``<task>_<date>_<time>_<process>.json``.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    stamp = time.strftime("%Y%m%d_%H%M%S", time.gmtime(begun))
-    path = folder / f"{task.replace('/', '_')}_{stamp}_{os.getpid()}.json"
-    content = {
-        "task": task,
-        "begun": begun,
-        "outcome": outcome,
-        "succeeded": succeeded,
-        "error": error,
-        "states": [asdict(record) for record in records],
-    }
-    write_atomically(path, json.dumps(content, indent=1))
-    return path

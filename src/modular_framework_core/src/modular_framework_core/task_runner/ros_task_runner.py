@@ -44,9 +44,15 @@ from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator, loading, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
-from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
+from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder
 from modular_framework_core.task_runner.ros_introspection import with_introspection
-from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
+from modular_framework_core.task_runner.task_runner import (
+    EXIT_NOT_RUN,
+    EXIT_SUCCEEDED,
+    TaskResult,
+    TaskRun,
+    write_record,
+)
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_frozen_nodes import frozen_nodes
@@ -194,7 +200,7 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
         for signal_number, handler in previous_handlers.items():
             signal.signal(signal_number, handler)
     result = run.result()
-    _write_record(name, started, result, recorder)
+    _write_record(started, result, recorder)
     reporter.on_end(result, frozen_nodes())
     time.sleep(PUBLISH_TIME_S)
     return result.exit_code
@@ -205,10 +211,10 @@ def _on_stop_request(stop_causes: list[str]) -> TriggerResponse:
     return TriggerResponse(success=True, message="the running states have been asked to stop")
 
 
-def _write_record(name: str, started: float, result: TaskResult, recorder: TaskRecorder) -> None:
+def _write_record(started: float, result: TaskResult, recorder: TaskRecorder) -> None:
     try:
         folder = Path(_parameter("~record_directory") or default_folders.framework_home() / "task_records")
-        path = write_record(folder, name, started, result.outcome, result.succeeded, result.error, recorder.records())
+        path = write_record(folder, started, result, recorder.records())
     except (OSError, TaskNotRun) as error:
         rospy.logwarn(f"the record of the run is not written: {error}; set ~record_directory to a writable folder")
         return
@@ -359,7 +365,9 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
             rospy.logwarn(pipeline.no_states_in(folder))
         output = generator.default_output_directory()
         file_name = _parameter("~generated_state_machine_name")
-        task, path = pipeline.construct_task(script, states, templates, output, _known_names(), file_name)
+        task, path = pipeline.construct_task(
+            script, states, templates, output, known=_known_names(), file_name=file_name
+        )
     except (TaskFault, generator.GenerationError, OSError, ValueError) as error:
         raise TaskNotRun(str(error)) from error
     rospy.loginfo(f"state machine of task '{task.name}' written to {path}")

@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+import json
+import os
 import threading
+import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import smach
-from modular_framework_core.task_runner.record import FailureSummary, TaskRecorder
+from modular_framework_core.files.atomic_files import write_atomically
+from modular_framework_core.task_runner.record import FailureSummary, StateRecord, TaskRecorder
 from modular_framework_ros.stop_requests import stoppable
 
 EXIT_SUCCEEDED = 0
@@ -154,3 +159,33 @@ def _location_prefix(error: Exception) -> str:
     lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
     locations = [line.partition(LOCATION_MARK)[2] for line in lines if LOCATION_MARK in line]
     return f"{locations[-1]}: " if locations else ""
+
+
+def write_record(folder: Path, begun: float, result: TaskResult, records: tuple[StateRecord, ...]) -> Path:
+    """Writes the record of one run as JSON, for tools that compare runs.
+
+    The keys are ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``, a list of
+    ``StateRecord`` fields.
+
+    Args:
+        folder: Output folder; created if missing.
+        begun: Start time of the task [s since 1970].
+        result: Result of the task.
+        records: Records of the state executions.
+
+    Returns:
+        The path of the file, ``<task>_<date>_<time>_<process>.json``.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    stamp = time.strftime("%Y%m%d_%H%M%S", time.gmtime(begun))
+    path = folder / f"{result.name.replace('/', '_')}_{stamp}_{os.getpid()}.json"
+    content = {
+        "task": result.name,
+        "begun": begun,
+        "outcome": result.outcome,
+        "succeeded": result.succeeded,
+        "error": result.error,
+        "states": [asdict(record) for record in records],
+    }
+    write_atomically(path, json.dumps(content, indent=1))
+    return path

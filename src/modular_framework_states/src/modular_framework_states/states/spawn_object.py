@@ -47,10 +47,10 @@ class SpawnObject(FrameworkState):
                 request_to_spawn(
                     self._object_name,
                     self._object_type,
-                    self._position,
-                    self._orientation,
-                    self._frame,
-                    str(rospy.get_param("gazebo_model_path", "")),
+                    position_m=self._position,
+                    rpy_rad=self._orientation,
+                    reference_frame=self._frame,
+                    model_path=str(rospy.get_param("gazebo_model_path", "")),
                 )
             )
         except (ObjectRequestError, RefusedError) as error:
