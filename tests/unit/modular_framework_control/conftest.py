@@ -37,7 +37,7 @@ class Loop:
         self.controllers: dict[str, Controller] = {}
         self.fault_of_topics: Exception | None = None
         self.update_wait_s = update_wait_s
-        self.manager = ControllerManager(self.robot_hw, root, types, self._attach, update_wait_s)
+        self.manager = ControllerManager(self.robot_hw, root, types, attach=self._attach, update_wait_s=update_wait_s)
         self.time_s = 100.0
         self.period_s = 0.01
 

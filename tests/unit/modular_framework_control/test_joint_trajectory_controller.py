@@ -469,7 +469,7 @@ def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(
     active = send(loop, (0.5, (0.3, 0.1, 0.1)))
     loop.run(0.1)
 
-    def splice(*args: Any) -> None:
+    def splice(*_: Any, **__: Any) -> None:
         raise ArithmeticError("no such spline")
 
     monkeypatch.setattr(joint_trajectory_controller, "splice", splice)

@@ -20,7 +20,7 @@ from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_control.ros import controller_action_server
-from modular_framework_control.ros.controller_action_server import ControllerActionServer
+from modular_framework_control.ros.controller_action_server import ControllerActionServer, GoalCallbacks
 from modular_framework_control.ros.conversions import trajectory_from_msg
 from modular_framework_control.ros.large_messages import ReceiveBuffer
 from modular_framework_control.ros.trajectory_messages import CompactJointTrajectory, CompactTrajectoryActionGoal
@@ -115,7 +115,7 @@ def test_points_without_values_for_very_many_joints_take_no_memory() -> None:
 
 def test_a_track_copies_nothing_of_a_trajectory_in_the_control_loop() -> None:
     spline = Spline(trajectory_from_msg(received(message())))
-    track = splice(spline, [0, 1], 10.0, 10.0, np.full((3, 2), 7.0), [True, True])
+    track = splice(spline, [0, 1], origin_s=10.0, splice_s=10.0, state=np.full((3, 2), 7.0), continuous=[True, True])
     assert np.shares_memory(track.others, spline.coefficients)
     part = track.without([1])
     assert part is not None and np.shares_memory(part.others, spline.coefficients)
@@ -167,7 +167,8 @@ def test_a_cancel_does_not_wait_until_a_goal_is_checked_and_ends_that_goal_too(
         events.append("submitted")
 
     FakeServer.made = []
-    ControllerActionServer("s", object, submit, lambda handle: events.append("cancel"), None, None)  # type: ignore[arg-type]
+    callbacks = GoalCallbacks(submit=submit, cancel=lambda _: events.append("cancel"), make_result=lambda _: None)
+    ControllerActionServer("s", object, callbacks, None)  # type: ignore[arg-type]
     (server,) = FakeServer.made
     lock = server.lock
 

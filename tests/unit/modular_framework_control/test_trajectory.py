@@ -43,7 +43,7 @@ def trajectory_of(times: np.ndarray, states: np.ndarray, rows: int) -> JointTraj
 
 
 def track_of(trajectory: JointTrajectory, start: np.ndarray) -> Track:
-    return splice(Spline(trajectory), [0, 1, 2], 0.0, 0.0, start, [False] * 3)
+    return splice(Spline(trajectory), [0, 1, 2], origin_s=0.0, splice_s=0.0, state=start, continuous=[False] * 3)
 
 
 def test_points_with_velocities_are_joined_by_the_cubic_of_scipy() -> None:
@@ -89,7 +89,14 @@ def test_a_splice_continues_the_motion_it_replaces(values: list[float], splice_s
     times, states = random_states(5)
     state = np.array(values).reshape(3, 3)
     origin_s = splice_s - 0.5 * float(times[0])
-    track = splice(Spline(trajectory_of(times, states, rows)), [0, 1, 2], origin_s, splice_s, state, [False] * 3)
+    track = splice(
+        Spline(trajectory_of(times, states, rows)),
+        [0, 1, 2],
+        origin_s=origin_s,
+        splice_s=splice_s,
+        state=state,
+        continuous=[False] * 3,
+    )
     begun = track.sample(splice_s)
     for row in range(rows if rows > 1 else 1):
         assert begun[row] == pytest.approx(state[row], abs=1e-9)
@@ -110,7 +117,7 @@ def test_a_trajectory_that_starts_where_the_joints_are_is_followed_as_sent() -> 
 def test_a_joint_without_end_goes_the_short_way() -> None:
     trajectory = JointTrajectory.of_points(("a",), (TrajectoryPoint(1.0, (0.1,)), TrajectoryPoint(2.0, (0.4,))))
     state = np.array([[4.0 * math.pi - 0.1], [0.0], [0.0]])
-    track = splice(Spline(trajectory), [0], 0.0, 0.0, state, [True])
+    track = splice(Spline(trajectory), [0], origin_s=0.0, splice_s=0.0, state=state, continuous=[True])
     assert track.sample(1.0)[0, 0] == pytest.approx(4.0 * math.pi + 0.1)
     assert track.sample(3.0)[0, 0] == pytest.approx(4.0 * math.pi + 0.4)
 

@@ -20,7 +20,7 @@ def world(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     monkeypatch.setattr(
         grasp_state, "selected_or_named", lambda *_: SimpleNamespace(object_id=world.object_id, grasp_id="g")
     )
-    monkeypatch.setattr(grasp_state, "send", lambda *_: None)
+    monkeypatch.setattr(grasp_state, "send", lambda *_, **__: None)
     monkeypatch.setattr(grasp_state, "held_objects", lambda: dict(world.held))
     return world
 

@@ -25,7 +25,7 @@ class GraspGoalError(RuntimeError):
 
 
 def send(
-    client: Any, stage: Stage, grasp: Any, max_torque: float, timeout_s: float, stop_requested: Callable[[], bool]
+    client: Any, stage: Stage, grasp: Any, *, max_torque: float, timeout_s: float, stop_requested: Callable[[], bool]
 ) -> None:
     """Sends a grasp stage and returns once the server reports that the stage was reached.
 

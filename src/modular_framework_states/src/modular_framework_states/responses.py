@@ -104,35 +104,42 @@ class ResponseRules:
         return {key: field_at(response, path) for key, path in self.keep.items()}
 
 
-def end_by_response(
-    state: FrameworkState,
-    rules: ResponseRules,
-    response: Any,
-    userdata: Any,
-    what: str,
-    stated_reason: str,
-    aborted: bool = False,
-) -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """The response of a service, or the result of an action.
+
+    Attributes:
+        message: Response message.
+        what: Description of the service or action, for reasons.
+        reason: Reason stated in the response.
+        aborted: Whether the action was aborted, which excludes the first outcome.
+    """
+
+    message: Any
+    what: str
+    reason: str
+    aborted: bool = False
+
+
+def end_by_response(state: FrameworkState, rules: ResponseRules, response: Response, userdata: Any) -> str:
     """Ends a state by a response: stores fields in userdata and returns the outcome.
 
     Args:
         state: State to end.
         rules: Rules for the outcome and userdata.
-        response: Response message.
+        response: Response of the service or action.
         userdata: Userdata of the state.
-        what: Description of the service or action, for reasons.
-        stated_reason: Reason in the response.
-        aborted: Whether the action was aborted, which excludes the first outcome.
     """
+    message, what = response.message, response.what
     try:
-        outcome = rules.outcome(response, state.outcomes) if rules.outcome_field else state.outcomes[0]
-        if aborted and outcome == state.outcomes[0]:
+        outcome = rules.outcome(message, state.outcomes) if rules.outcome_field else state.outcomes[0]
+        if response.aborted and outcome == state.outcomes[0]:
             return state.fail(f"{what}; its {rules.outcome_field} says '{outcome}'")
-        for key, value in rules.kept(response).items():
+        for key, value in rules.kept(message).items():
             userdata[key] = value
     except FillingError as error:
         return state.fail(f"{what}: {error}")
     if outcome == state.outcomes[0]:
         return state.succeed()
-    reason = f"{what}: its {rules.outcome_field} is {field_at(response, rules.outcome_field)!r}: {stated_reason}"
+    reason = f"{what}: its {rules.outcome_field} is {field_at(message, rules.outcome_field)!r}: {response.reason}"
     return state.end(outcome, reason)

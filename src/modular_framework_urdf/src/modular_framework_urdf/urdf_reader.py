@@ -45,7 +45,7 @@ class AttributeFault(XmlError):
         expected: Allowed values.
     """
 
-    def __init__(self, where: str, tag: str, owner: str, key: str, text: str, expected: str) -> None:
+    def __init__(self, where: str, *, tag: str, owner: str, key: str, text: str, expected: str) -> None:
         super().__init__(
             where, f"<{tag}> of {owner}: {key} is '{text}'", f"expected {expected}; correct the description"
         )
@@ -118,7 +118,14 @@ class _Attributes:
 
     def _fault(self, key: str, text: str, expected: str) -> AttributeFault:
         element: Element = self._element
-        return AttributeFault(f"{self._where}:{element.sourceline}", element.tag, self._owner, key, text, expected)
+        return AttributeFault(
+            f"{self._where}:{element.sourceline}",
+            tag=element.tag,
+            owner=self._owner,
+            key=key,
+            text=text,
+            expected=expected,
+        )
 
 
 def _link(element: Element, where: str) -> Link:

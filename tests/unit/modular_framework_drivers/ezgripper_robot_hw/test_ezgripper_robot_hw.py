@@ -64,7 +64,7 @@ class Loop:
     def __init__(self, robot_hw: RobotHW, root: MappingNodeHandle) -> None:
         self.robot_hw = robot_hw
         self.controllers: dict[str, Controller] = {}
-        self.manager = ControllerManager(robot_hw, root, None, self._attach)
+        self.manager = ControllerManager(robot_hw, root, None, attach=self._attach)
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
         self.controllers[name] = controller

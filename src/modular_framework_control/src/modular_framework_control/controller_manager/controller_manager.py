@@ -74,6 +74,7 @@ class ControllerManager:
         robot_hw: RobotHW,
         root_nh: NodeHandle,
         types: ControllerTypes | None = None,
+        *,
         attach: Attach = _attach_nothing,
         update_wait_s: float = 10.0,
         clock: Callable[[], float] = time.perf_counter,

@@ -314,10 +314,10 @@ class JointTrajectoryController(Controller):
         track = splice(
             goal.spline,
             joints,
-            origin_s,
-            splice_s,
-            self._plan.sample(splice_s)[:, joints],
-            self._continuous[joints].tolist(),
+            origin_s=origin_s,
+            splice_s=splice_s,
+            state=self._plan.sample(splice_s)[:, joints],
+            continuous=self._continuous[joints].tolist(),
         )
         refusal = self._beyond_limits(goal, track, splice_s - origin_s)
         if refusal:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import rospy
@@ -39,33 +40,35 @@ class GoalRefusedError(Exception):
         self.result = result
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalCallbacks:
+    """A controller's side of an action.
+
+    Attributes:
+        submit: Callback that passes a goal message and its goal handle to the controller, or raises GoalRefusedError.
+        cancel: Callback that requests the controller to cancel a goal.
+        make_result: Callback that returns the result message of a finished goal.
+        is_fault: Callback that decides whether to log a warning for an aborted or rejected goal.
+    """
+
+    submit: Submit
+    cancel: Callable[[Any], None]
+    make_result: MakeResult
+    is_fault: Callable[[RealtimeGoalHandle[Any]], bool] = lambda _: True
+
+
 class ControllerActionServer:
     """Serves one action of a controller; a new goal preempts the previous goal.
 
     Args:
         name: Absolute action name.
         action: Message class of the action.
-        submit: Callback that passes a goal message and its goal handle to the controller, or raises GoalRefusedError.
-        cancel: Callback that requests the controller to cancel a goal.
-        make_result: Callback that returns the result message of a finished goal.
+        callbacks: The controller's side of the action.
         outbox: Thread that publishes for the control loop.
-        is_fault: Callback that decides whether to log a warning for an aborted or rejected goal.
     """
 
-    def __init__(
-        self,
-        name: str,
-        action: type[Any],
-        submit: Submit,
-        cancel: Callable[[Any], None],
-        make_result: MakeResult,
-        outbox: Outbox,
-        is_fault: Callable[[RealtimeGoalHandle[Any]], bool] = lambda _: True,
-    ) -> None:
-        self._submit = submit
-        self._cancel = cancel
-        self._make_result = make_result
-        self._is_fault = is_fault
+    def __init__(self, name: str, action: type[Any], callbacks: GoalCallbacks, outbox: Outbox) -> None:
+        self._callbacks = callbacks
         self._outbox = outbox
         self._goals: dict[RealtimeGoalHandle[Any], ServerGoalHandle] = {}
         self._submitting = threading.Lock()  # goals keep their order
@@ -89,9 +92,9 @@ class ControllerActionServer:
         self._goals[goal_handle] = goal
         try:
             with released(self._server.lock), self._submitting:
-                self._submit(goal.get_goal(), goal_handle)
+                self._callbacks.submit(goal.get_goal(), goal_handle)
             if goal.get_goal_status().status == GoalStatusMsg.RECALLING:  # canceled before it was submitted
-                self._cancel(goal_handle)
+                self._callbacks.cancel(goal_handle)
         except GoalRefusedError as error:
             del self._goals[goal_handle]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
@@ -104,7 +107,7 @@ class ControllerActionServer:
     def _on_cancel(self, goal: ServerGoalHandle) -> None:
         for goal_handle, known in list(self._goals.items()):
             if known == goal:
-                self._cancel(goal_handle)
+                self._callbacks.cancel(goal_handle)
 
     def _publish_status(self, goal_handle: RealtimeGoalHandle[Any], status: GoalStatus) -> None:
         goal = self._goals[goal_handle]
@@ -119,6 +122,6 @@ class ControllerActionServer:
             GoalStatus.REJECTED: goal.set_rejected,
         }[status]
         if status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
-            log = rospy.logwarn if self._is_fault(goal_handle) else rospy.logdebug
+            log = rospy.logwarn if self._callbacks.is_fault(goal_handle) else rospy.logdebug
             log("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
-        finish(self._make_result(goal_handle), goal_handle.text)
+        finish(self._callbacks.make_result(goal_handle), goal_handle.text)

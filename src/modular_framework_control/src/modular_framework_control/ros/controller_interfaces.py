@@ -36,7 +36,11 @@ from modular_framework_control.mobile_base.mobile_base_controller import MobileB
 from modular_framework_control.realtime.goal_handle import RealtimeGoalHandle
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros import conversions
-from modular_framework_control.ros.controller_action_server import ControllerActionServer, GoalRefusedError
+from modular_framework_control.ros.controller_action_server import (
+    ControllerActionServer,
+    GoalCallbacks,
+    GoalRefusedError,
+)
 from modular_framework_control.ros.joint_command_interface import JointCommandRosInterface, joint_control_to_msg
 from modular_framework_control.ros.mobile_base_interfaces import (
     DiffDriveRosInterface,
@@ -108,9 +112,7 @@ class JointTrajectoryRosInterface:
             self._action = ControllerActionServer(
                 f"{self._name}/follow_joint_trajectory",
                 CompactFollowJointTrajectoryAction,
-                self._submit,
-                controller.cancel,
-                _trajectory_result,
+                GoalCallbacks(submit=self._submit, cancel=controller.cancel, make_result=_trajectory_result),
                 outbox,
             )
             opened.callback(self._action.close)
@@ -179,11 +181,13 @@ class GripperRosInterface:
             self._action = ControllerActionServer(
                 join_names(namespace, f"{name}/gripper_cmd"),
                 GripperCommandAction,
-                self._submit,
-                controller.cancel,
-                _gripper_result,
+                GoalCallbacks(
+                    submit=self._submit,
+                    cancel=controller.cancel,
+                    make_result=_gripper_result,
+                    is_fault=_is_gripper_fault,
+                ),
                 outbox,
-                _is_gripper_fault,
             )
             opened.callback(self._action.close)
             self._opened = opened.pop_all()

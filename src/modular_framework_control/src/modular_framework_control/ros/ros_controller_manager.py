@@ -67,7 +67,7 @@ class RosControllerManager:
         self._namespace = namespace
         self._outbox, self._log = Outbox(), LoopLog()
         self._loop_time = loop_time if loop_time is not None else LoopTime()
-        self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, self._attach)
+        self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, attach=self._attach)
         self._services: list[rospy.Service] = []
         self._statistics_publisher: rospy.Publisher | None = None
         self._statistics_due_s = 0.0

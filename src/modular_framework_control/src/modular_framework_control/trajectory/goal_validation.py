@@ -87,7 +87,12 @@ def validate_goal(
         if math.isnan(goal.goal_time_tolerance_s):
             raise InvalidTrajectoryError("goal_time_tolerance is not a number")
         goal_tolerances = tolerances_of_goal(
-            tolerances, joint_names, joints, goal.path_tolerance, goal.goal_tolerance, goal.goal_time_tolerance_s
+            tolerances,
+            joint_names,
+            joints,
+            path=goal.path_tolerance,
+            goal=goal.goal_tolerance,
+            goal_time_s=goal.goal_time_tolerance_s,
         )
     except InvalidTrajectoryError as error:
         raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, str(error)) from error

@@ -281,7 +281,7 @@ class Track:
 
 
 def splice(
-    spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array, continuous: Sequence[bool]
+    spline: Spline, joints: Sequence[int], *, origin_s: float, splice_s: float, state: Array, continuous: Sequence[bool]
 ) -> Track:
     """Joins a new trajectory to the current motion.
 

@@ -78,16 +78,18 @@ class StopMotion:
             _ramp(
                 joint,
                 (position[joint], velocity[joint] / rate) if duration_s > 0.0 else (actual[POSITION, joint], 0.0),
-                time_s,
-                duration_s,
-                limits.max_positions[joint] if velocity[joint] > 0.0 else limits.min_positions[joint],
-                3 if is_sharp else 5,
+                time_s=time_s,
+                duration_s=duration_s,
+                bound=limits.max_positions[joint] if velocity[joint] > 0.0 else limits.min_positions[joint],
+                order=3 if is_sharp else 5,
             )
             for joint, duration_s in enumerate(durations_s.tolist())
         ]
 
 
-def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float, order: int) -> Track:
+def _ramp(
+    joint: int, start: tuple[float, float], *, time_s: float, duration_s: float, bound: float, order: int
+) -> Track:
     """Returns a ramp to rest over half the distance of unbraked motion, shortened to end at `bound`.
 
     With `order` 3 the velocity decreases linearly, with 5 as 1 - 3s^2 + 2s^3.

@@ -77,6 +77,7 @@ def tolerances_of_goal(
     defaults: Tolerances,
     joint_names: Sequence[str],
     joints: Sequence[int],
+    *,
     path: Mapping[str, JointTolerance],
     goal: Mapping[str, JointTolerance],
     goal_time_s: float,

@@ -223,7 +223,7 @@ class UrEmulator:
         self.controller.stop_program()
 
     def command_wrench(
-        self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0, tz: float = 0.0
+        self, *, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0, tz: float = 0.0
     ) -> None:
         """Sets the measured wrench.
 

@@ -17,7 +17,14 @@ from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
-from modular_framework_states.responses import KeptFields, MessageFields, OutcomeValues, ResponseRules, end_by_response
+from modular_framework_states.responses import (
+    KeptFields,
+    MessageFields,
+    OutcomeValues,
+    Response,
+    ResponseRules,
+    end_by_response,
+)
 
 RESULT_KEY = "result"
 
@@ -92,7 +99,8 @@ class CallAction(FrameworkState):
         wrong = difference(result, expected)
         if wrong:
             return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}, but {wrong}")
-        return end_by_response(self, self._rules, result, userdata, what, stated_reason, aborted=bool(aborted))
+        response = Response(message=result, what=what, reason=stated_reason, aborted=bool(aborted))
+        return end_by_response(self, self._rules, response, userdata)
 
     def _type_of(self, name: str) -> Any:
         found: list[str] = []

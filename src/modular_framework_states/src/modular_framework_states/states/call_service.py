@@ -13,7 +13,14 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, call_service, wait_until
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
-from modular_framework_states.responses import KeptFields, MessageFields, OutcomeValues, ResponseRules, end_by_response
+from modular_framework_states.responses import (
+    KeptFields,
+    MessageFields,
+    OutcomeValues,
+    Response,
+    ResponseRules,
+    end_by_response,
+)
 
 RESPONSE_KEY = "response"
 
@@ -80,7 +87,8 @@ class CallService(FrameworkState):
         wrong = difference(response, expected)
         if wrong:
             return self.fail(f"service '{name}' answered, but {wrong}")
-        return end_by_response(self, self._rules, response, userdata, f"service '{name}'", _reason_in(response))
+        answer = Response(message=response, what=f"service '{name}'", reason=_reason_in(response))
+        return end_by_response(self, self._rules, answer, userdata)
 
 
 def _reason_in(response: Any) -> str:
