@@ -71,7 +71,7 @@ def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
     planner = {"ompl": OmplPlanner, "stomp": StompPlanner}.get(kind, CommandPlanner)
     adapters = () if kind in ("ptp", "lin") else make_adapters()
     made = planner.configure(model, settings) if hasattr(planner, "configure") else planner()
-    return PlanningPipeline(model, KinematicsPool(model), settings, made, adapters)
+    return PlanningPipeline(KinematicsPool(model), settings, made, adapters=adapters)
 
 
 def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, list[tuple[object, ...]]]:

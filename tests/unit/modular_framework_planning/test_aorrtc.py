@@ -13,7 +13,7 @@ from test_rrt_connect import COVER, GOAL, RANGE, STEP, WALL, problem_in, scene_w
 
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect
+from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, TreeGrowth
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -67,12 +67,13 @@ def test_without_a_seed_it_uses_its_time() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_path_is_shorter_than_its_bound(small: RobotModel, seed: int) -> None:  # noqa: F811
     scene = scene_with(small, WALL, COVER)
-    first = RrtConnect(problem_in(scene, seed), GOAL[None], STEP, RANGE, is_weighted=False).run()
+    first = RrtConnect(
+        problem_in(scene, seed), GOAL[None], TreeGrowth(check_step=STEP, max_extension=RANGE, is_weighted=False)
+    ).run()
     assert first is not None
     length_bound = 0.9 * path_length(first)
-    search = RrtConnect(
-        problem_in(scene, seed), GOAL[None], STEP, RANGE, 3000, is_weighted=False, length_bound=length_bound
-    )
+    growth = TreeGrowth(check_step=STEP, max_extension=RANGE, extension_limit=3000, is_weighted=False)
+    search = RrtConnect(problem_in(scene, seed), GOAL[None], growth, length_bound=length_bound)
     second = search.run()
     assert second is None or path_length(second) <= length_bound + 1e-9
 
@@ -80,5 +81,6 @@ def test_a_path_is_shorter_than_its_bound(small: RobotModel, seed: int) -> None:
 def test_no_path_is_shorter_than_the_straight_way(small: RobotModel) -> None:  # noqa: F811
     problem = problem_in(scene_with(small, WALL, COVER))
     length_bound = 1.0001 * float(np.linalg.norm(GOAL - problem.start_values))
-    search = RrtConnect(problem, GOAL[None], STEP, RANGE, 500, is_weighted=False, length_bound=length_bound)
+    growth = TreeGrowth(check_step=STEP, max_extension=RANGE, extension_limit=500, is_weighted=False)
+    search = RrtConnect(problem, GOAL[None], growth, length_bound=length_bound)
     assert search.run() is None and search.extensions == 500

@@ -61,11 +61,10 @@ def motion(corner: int | None, path_prefix: int = 0) -> Trajectory:
         pose = pin.SE3(np.eye(3), np.array([*(WAY[corner] + inside), 0.0]))
         scene = scene.with_object(CollisionObject("box", pose, ((Box(0.3, 0.3, 0.1), pin.SE3.Identity()),)))
     pipeline = PlanningPipeline(
-        model,
         KinematicsPool(model),
         PipelineSettings(default_velocity_scaling_factor=1.0, default_acceleration_scaling_factor=1.0),
         AlongTheWay(path_prefix),
-        (AddTimeOptimalParameterization(),),
+        adapters=(AddTimeOptimalParameterization(),),
     )
     goal = JointGoal(dict(zip(("x", "y"), WAY[-1].tolist(), strict=True)))
     return pipeline.plan(PlanningRequest(scene, "tool", (goal,), allowed_time_s=20.0)).trajectory

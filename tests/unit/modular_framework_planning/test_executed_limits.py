@@ -23,6 +23,7 @@ from moveit_commander.trajectory_timing import Limits, distinct, retime  # noqa:
 from modular_framework_planning.cartesian.cartesian_path import straight_line  # noqa: E402
 from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool  # noqa: E402
+from modular_framework_planning.kinematics.pose_follower import PoseFollower  # noqa: E402
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.trajectory_processing.compiled_timing import max_blends  # noqa: E402
 from modular_framework_planning.trajectory_processing.jerk_limits import (  # noqa: E402
@@ -31,7 +32,7 @@ from modular_framework_planning.trajectory_processing.jerk_limits import (  # no
     slowed_to_limits,
 )
 from modular_framework_planning.trajectory_processing.line_timing import time_line  # noqa: E402
-from modular_framework_planning.trajectory_processing.link_speed import with_limited_link_speed  # noqa: E402
+from modular_framework_planning.trajectory_processing.link_speed import MovedFrame, with_limited_link_speed  # noqa: E402
 from modular_framework_planning.trajectory_processing.time_parameterization import parameterize  # noqa: E402
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory  # noqa: E402
 
@@ -73,15 +74,9 @@ def with_slow_link(model: RobotModel, path: np.ndarray, limits: Limits) -> Traje
         limits.acceleration,
     )
     flange = model.pin_model.frames[model.frame_ids["flange"]]
-    return with_limited_link_speed(
-        model,
-        motion,
-        lambda values: values,
-        FrameOnRobot("flange", int(flange.parentJoint), flange.placement),
-        0.1,
-        limits.velocity,
-        limits.acceleration,
-    )
+    frame = FrameOnRobot("flange", int(flange.parentJoint), flange.placement)
+    moved = MovedFrame(model, frame, lambda values: values)
+    return with_limited_link_speed(motion, moved, 0.1, limits.velocity, limits.acceleration)
 
 
 JERK = np.full(7, 50.0)
@@ -149,7 +144,7 @@ def test_a_straight_line_keeps_the_limits_when_timed_and_retimed(seven: RobotMod
     goal = pin.SE3(seven_joint_flange(start))
     goal.translation += (0.0, 0.1, 0.0)
     solver = KinematicsPool(seven).solver("arm")
-    rows = straight_line(solver, "flange", start, [goal], 0.005).rows
+    rows = straight_line(PoseFollower(solver, "flange", start), [goal], 0.005).rows
     limits = Limits(seven.lower, seven.upper, scaling * seven.max_velocity, scaling * seven.max_acceleration)
     motion = time_line(solver.group.joints, rows, limits.velocity, limits.acceleration, lambda _: True)
     require_limits(rows_of(motion), limits)

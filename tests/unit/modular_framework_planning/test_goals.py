@@ -57,12 +57,10 @@ def resolve(model: RobotModel, scene: PlanningScene) -> Resolve:
         motion = MotionChecker(checker, group.indices, world.positions)
         found = GoalResolver(
             PlanningRequest(world, GROUP, goals),
-            group,
             KinematicsPool(model),
-            checker,
             motion,
             np.random.default_rng(1),
-            path,
+            path_constraints=path,
         ).resolve()
         distances = np.linalg.norm(found - world.positions[group.indices], axis=1)
         assert (np.diff(distances) >= 0.0).all(), "nearest first"
@@ -227,7 +225,7 @@ def test_position_only_ik_leaves_the_orientation_of_a_pose_goal_open() -> None:
     def resolved(position_only: bool) -> np.ndarray:
         pool = KinematicsPool(arm, {"arm": KinematicsSettings(position_only=position_only)})
         request, rng = PlanningRequest(scene, "arm", (goal,)), np.random.default_rng(1)
-        return GoalResolver(request, group, pool, checker, motion, rng).resolve()
+        return GoalResolver(request, pool, motion, rng).resolve()
 
     for pan, lift, elbow in resolved(True):
         reached = tool_in_cart(pan, lift, elbow) @ [*offset, 1.0]

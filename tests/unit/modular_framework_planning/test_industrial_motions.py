@@ -40,7 +40,7 @@ def pipeline(model: RobotModel) -> PlanningPipeline:
         parameters={"default_planner_config": "PTP"}, robot_planning={"cartesian_limits": LIMITS}
     )
     planner = CommandPlanner.configure(model, settings)
-    return PlanningPipeline(model, KinematicsPool(model), settings, planner, (), "pilz")
+    return PlanningPipeline(KinematicsPool(model), settings, planner, adapters=(), name="pilz")
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +123,7 @@ def test_a_faster_joint_does_not_run_ahead_of_the_strictest_limit(robot: object)
     scene = empty_scene(
         model, model.merge(model.default_positions(), dict(zip(model.group(GROUP).joints, HOME, strict=True)))
     )
-    pipeline = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), CommandPlanner(None), ())
+    pipeline = PlanningPipeline(KinematicsPool(model), PipelineSettings(), CommandPlanner(None), adapters=())
     goal = JointGoal({"wrist_3_joint": 1.0})
     motion = pipeline.plan(
         PlanningRequest(scene, GROUP, (goal,), "PTP", velocity_scaling=1.0, acceleration_scaling=1.0)
@@ -279,7 +279,7 @@ def test_refusals_have_a_code_and_a_reason(
     for request, code, text in cases:
         error = failure(pipeline, request)
         assert error.code == code and text in error.reason, error.reason
-    bare = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), CommandPlanner(None), ())
+    bare = PlanningPipeline(KinematicsPool(model), PipelineSettings(), CommandPlanner(None), adapters=())
     error = failure(bare, line)
     assert error.code == ErrorCode.INVALID_MOTION_PLAN and "cartesian_limits is not set" in error.reason
     with pytest.raises(ModelError, match="sampling_time"):
@@ -296,7 +296,7 @@ def test_being_there_already_gives_a_motion_of_one_point(
 def test_the_sampling_time_changes_the_points_and_not_the_motion(
     model: RobotModel, pipeline: PlanningPipeline, scene: PlanningScene, home: pin.SE3
 ) -> None:
-    fine = PlanningPipeline(model, KinematicsPool(model), PipelineSettings(), CommandPlanner(LIMITS, 0.02), ())
+    fine = PlanningPipeline(KinematicsPool(model), PipelineSettings(), CommandPlanner(LIMITS, 0.02), adapters=())
     request = lin(scene, moved(home, (0.2, 0.0, 0.0)))
     one, other = pipeline.plan(request).trajectory, fine.plan(request).trajectory
     assert len(other.times) > 2 * len(one.times) and one.duration_s == other.duration_s

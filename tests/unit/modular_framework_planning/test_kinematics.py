@@ -74,7 +74,7 @@ def test_numeric_search_solves_what_the_closed_form_solves(model: RobotModel, so
     rng = np.random.default_rng(2)
     for _ in range(20):
         target = model.link_transforms(random_positions(model, rng))[TIP]
-        found = numeric.solutions(TIP, target, model.default_positions(), 0.5)
+        found = numeric.solutions(TIP, target, model.default_positions(), timeout_s=0.5)
         assert found
         distance, angle = pose_difference(model.link_transforms(found[0])[TIP], target)
         assert distance < 1e-6 and angle < 1e-6

@@ -40,7 +40,7 @@ class Robot:
     def __init__(self, model: RobotModel) -> None:
         self.model, self.kinematics = model, KinematicsPool(model)
         self.settings = PipelineSettings()
-        self.pipeline = PlanningPipeline(model, self.kinematics, self.settings, CommandPlanner(LIMITS), ())
+        self.pipeline = PlanningPipeline(self.kinematics, self.settings, CommandPlanner(LIMITS), adapters=())
         joints = model.group(GROUP).joints
         self.scene = empty_scene(model, model.merge(model.default_positions(), dict(zip(joints, HOME, strict=True))))
         self.follower = PoseFollower(self.kinematics.solver(GROUP), LINK, self.scene.positions)

@@ -17,6 +17,7 @@ from modular_framework_planning.cartesian.cartesian_path import straight_line  #
 from modular_framework_planning.errors import PlanningError  # noqa: E402
 from modular_framework_planning.geometry.spatial import Transform  # noqa: E402
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool  # noqa: E402
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.messages.conversions import goals_from_constraints  # noqa: E402
 from modular_framework_planning.planners.ompl.planner import OmplPlanner  # noqa: E402
 from modular_framework_planning.planning_interface.planning_request import (  # noqa: E402
@@ -65,7 +66,9 @@ def palm(positions: np.ndarray) -> Transform:
 
 def planned(scene: PlanningScene, goals: tuple[object, ...]) -> np.ndarray:
     """Joint positions of a motion, and that it names no passive joint."""
-    pipeline = PlanningPipeline(MODEL, KinematicsPool(MODEL), PipelineSettings(seed=1), OmplPlanner(), make_adapters())
+    pipeline = PlanningPipeline(
+        KinematicsPool(MODEL), PipelineSettings(seed=1), OmplPlanner(), adapters=make_adapters()
+    )
     answer = pipeline.plan(PlanningRequest(scene, "arm", goals, "RRTConnect", allowed_time_s=30.0))
     assert answer.trajectory.joint_names == tuple(AXES) and answer.goal[MODEL.index[SPRING]] == BENT[SPRING]
     return answer.goal
@@ -87,7 +90,7 @@ def test_a_joint_goal_may_name_a_passive_joint(
 def test_ik_of_the_link_beyond_a_passive_joint_leaves_it_where_it_is(spring: float, values: tuple[float, ...]) -> None:
     target = palm(scene_at(**dict(zip(AXES, values, strict=True)), **{SPRING: spring}).positions)
     seed = scene_at(**{SPRING: spring}).positions
-    found = KinematicsPool(MODEL).solver("arm").solutions("palm", target, seed, 5.0)
+    found = KinematicsPool(MODEL).solver("arm").solutions("palm", target, seed, timeout_s=5.0)
     assert found and all(item[MODEL.index[SPRING]] == seed[MODEL.index[SPRING]] for item in found)
     assert np.abs(pin.log6(palm(found[0]).actInv(target)).vector).max() < 1e-6
 
@@ -98,7 +101,8 @@ def test_a_pose_goal_and_a_line_of_the_link_beyond_a_passive_joint_are_reached()
     assert np.abs(pin.log6(palm(planned(scene, (PoseGoal("palm", target),))).actInv(target)).vector).max() < 1e-5
     lower = palm(scene.positions)
     lower.translation += palm(scene.positions).rotation @ np.array([0.0, 0.0, -0.02])
-    line = straight_line(KinematicsPool(MODEL).solver("arm"), "palm", scene.positions, [lower], 0.005)
+    follower = PoseFollower(KinematicsPool(MODEL).solver("arm"), "palm", scene.positions)
+    line = straight_line(follower, [lower], 0.005)
     assert line.fraction == 1.0
     end = scene.positions.copy()
     end[MODEL.group("arm").indices] = line.rows[-1]

@@ -19,7 +19,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.plan_statistics import CheckCounts, PlanStatistics, Refusals
-from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, TreeGrowth
 from modular_framework_planning.planning_interface.phase_times import SEARCH, SETUP, PhaseTimes
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
@@ -93,8 +93,9 @@ def test_an_edge_that_the_bounds_leave_open_counts_as_undecided_and_once(small: 
 
 def test_searches_side_by_side_are_counted_together(small: RobotModel) -> None:
     problem = problem_in(scene_with(small, WALL, COVER))
+    growth = TreeGrowth(check_step=0.02, max_extension=0.5)
     searches = [
-        RrtConnect(replace(problem, rng=rng), GOAL[None], 0.02, 0.5, search_index=index)
+        RrtConnect(replace(problem, rng=rng), GOAL[None], growth, search_index=index)
         for index, rng in enumerate([problem.rng, *problem.rng.spawn(2)])
     ]
     both = ParallelSearch(problem, searches)

@@ -22,7 +22,13 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.rrt_connect import compiled_rrt_connect, rrt_connect
-from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, can_search, reaches
+from modular_framework_planning.planners.rrt_connect.rrt_connect import (
+    ParallelSearch,
+    RrtConnect,
+    TreeGrowth,
+    can_search,
+    reaches,
+)
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
@@ -40,6 +46,7 @@ GOAL = np.array([2.0, 1.2, 0.3, 0.07])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.03])
 UNREACHABLE = np.array([2.0, 2.5, 2.5, 0.03])  # the arm touches itself
 STEP, RANGE = 0.02, 0.5
+GROWTH = TreeGrowth(check_step=STEP, max_extension=RANGE)
 WALL = (Box(0.9, 0.04, 0.6), np.array([0.35, 0.45, 0.3]))  # between start and goal; the arm goes over it
 COVER = (Box(0.9, 0.9, 0.02), np.array([0.0, 0.0, 0.95]))
 
@@ -94,7 +101,7 @@ def problem_in(
 
 def search(problem: PlanningProblem, limit: int | None = None, goal: np.ndarray = GOAL) -> RrtConnect:
     assert can_search(problem)
-    return RrtConnect(problem, goal[None], STEP, RANGE, limit)
+    return RrtConnect(problem, goal[None], replace(GROWTH, extension_limit=limit))
 
 
 @pytest.mark.parametrize("is_weighted", [False, True])
@@ -105,7 +112,7 @@ def test_a_path_round_a_wall_joins_start_and_goal_by_edges_that_plain_coal_calls
     plain = PlainCoalChecker(problem.scene, problem.group.indices)
     straight = problem.motion.full_path(np.array([START, GOAL]))
     assert not plain.path_is_free(straight, STEP), "the straight way is blocked"
-    path = RrtConnect(problem, GOAL[None], STEP, RANGE, is_weighted=is_weighted).run()
+    path = RrtConnect(problem, GOAL[None], replace(GROWTH, is_weighted=is_weighted)).run()
     assert path is not None
     assert np.array_equal(path[0], START) and np.array_equal(path[-1], GOAL)
     longest = np.linalg.norm(np.diff(path, axis=0), axis=1).max()
@@ -134,7 +141,7 @@ def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(sm
         return ParallelSearch(
             problem,
             [
-                RrtConnect(replace(problem, rng=rng), GOAL[None], STEP, RANGE, search_index=index)
+                RrtConnect(replace(problem, rng=rng), GOAL[None], GROWTH, search_index=index)
                 for index, rng in enumerate(generators)
             ],
         )
@@ -174,12 +181,13 @@ def cube_beside_a_wall(gap: float, seed: int) -> PlanningProblem:
 
 
 def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_leave_open() -> None:
+    growth = TreeGrowth(check_step=0.002, max_extension=0.02, is_weighted=False)
     for seed in range(8):
         paths, undecided = [], []
         for gap in (5.0e-6, 5.0e-3):  # the bounds leave edges open beside the near wall only
             problem = cube_beside_a_wall(gap, seed)
             searches = [
-                RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), 0.002, 0.02, None, False, index)
+                RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), growth, search_index=index)
                 for index, rng in enumerate([problem.rng, *problem.rng.spawn(3)])
             ]
             paths.append(ParallelSearch(problem, searches).run())
@@ -198,7 +206,7 @@ def test_searches_side_by_side_end_with_the_time_and_when_cancelled(small: Robot
 
     for problem in (problem_in(scene, seconds=0.2), problem_in(scene, cancelled=cancelled)):
         both = [
-            RrtConnect(replace(problem, rng=rng), UNREACHABLE[None], STEP, RANGE, search_index=index)
+            RrtConnect(replace(problem, rng=rng), UNREACHABLE[None], GROWTH, search_index=index)
             for index, rng in enumerate(problem.rng.spawn(2))
         ]
         assert ParallelSearch(problem, both).run() is None

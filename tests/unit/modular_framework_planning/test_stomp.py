@@ -52,7 +52,7 @@ def planned(
 ) -> PlanningAnswer:
     settings = PipelineSettings(seed=4, parameters=parameters or {})
     pipeline = PlanningPipeline(
-        model, KinematicsPool(model), settings, StompPlanner.configure(model, settings), make_adapters()
+        KinematicsPool(model), settings, StompPlanner.configure(model, settings), adapters=make_adapters()
     )
     joints = model.group(GROUP).joints
     goals = (JointGoal(dict(zip(joints, goal, strict=True))),)

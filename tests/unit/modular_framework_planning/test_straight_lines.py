@@ -14,6 +14,7 @@ from modular_framework_planning.cartesian.cartesian_path import JumpThresholds, 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planners.pilz.sequence import PlannedItem, SequenceJoiner
 from modular_framework_planning.planning_interface.planning_request import (
@@ -57,7 +58,7 @@ def off_line(rows: Array, shift: tuple[float, float, float]) -> float:
 
 def test_seven_joints_follow_a_line_and_are_timed_within_limits(seven: RobotModel, solver: InverseKinematics) -> None:
     shift = (0.1, 0.1, -0.1)
-    line = straight_line(solver, "flange", BENT, [ahead(shift)], 0.01)
+    line = straight_line(PoseFollower(solver, "flange", BENT), [ahead(shift)], 0.01)
     assert line.fraction == 1.0 and line.stop == "" and line.waypoint_rows == (len(line.rows) - 1,)
     assert off_line(line.rows, shift) < 1e-6
     assert np.abs(np.diff(line.rows, axis=0)).max() < 0.1
@@ -70,7 +71,7 @@ def test_seven_joints_follow_a_line_and_are_timed_within_limits(seven: RobotMode
 
 def test_the_fraction_counts_each_line_the_same(solver: InverseKinematics) -> None:
     near, far = ahead((0.0, 0.0, -0.05)), ahead((0.0, 0.0, -3.0))
-    line = straight_line(solver, "flange", BENT, [near, far], 0.01)
+    line = straight_line(PoseFollower(solver, "flange", BENT), [near, far], 0.01)
     assert 0.5 < line.fraction < 0.75 and line.waypoint_rows == (5,)
     assert line.stop.startswith("waypoint 1, step ") and line.code == ErrorCode.NO_IK_SOLUTION
     reached = seven_joint_flange(BENT)[2, 3] - seven_joint_flange(line.rows[-1])[2, 3]
@@ -84,7 +85,7 @@ def test_an_objection_ends_the_line_with_its_reason(solver: InverseKinematics) -
         asked.append(1)
         return "a wall" if len(asked) == 4 else ""
 
-    line = straight_line(solver, "flange", BENT, [ahead((0.1, 0, 0))], 0.01, objection=objection)
+    line = straight_line(PoseFollower(solver, "flange", BENT), [ahead((0.1, 0, 0))], 0.01, objection=objection)
     assert line.fraction == pytest.approx(0.3) and line.stop == "waypoint 0, step 4 of 10: a wall"
     assert line.code == ErrorCode.INVALID_MOTION_PLAN and len(line.rows) == 4
 
@@ -97,7 +98,7 @@ def test_an_objection_ends_the_line_with_its_reason(solver: InverseKinematics) -
     ],
 )
 def test_jumps_end_the_line_and_name_the_joint(solver: InverseKinematics, jumps: JumpThresholds, text: str) -> None:
-    line = straight_line(solver, "flange", BENT, [ahead((0.15, 0.1, 0))], 0.01, jumps)
+    line = straight_line(PoseFollower(solver, "flange", BENT), [ahead((0.15, 0.1, 0))], 0.01, jumps=jumps)
     assert line.fraction < 1.0 and "joint 'joint" in line.stop and text in line.stop
 
 
@@ -110,25 +111,27 @@ def test_jumps_end_the_line_and_name_the_joint(solver: InverseKinematics, jumps:
         ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: 50001; at most 50000"),
         ({"waypoints": []}, "at least one pose"),
         ({"jumps": JumpThresholds(factor=-1.0)}, "'factor' is -1.0"),
-        ({"link": "nobody"}, "nobody"),
     ],
 )
 def test_requests_without_meaning_are_refused(solver: InverseKinematics, changes: dict[str, object], text: str) -> None:
     arguments: dict[str, object] = {
-        "link": "flange",
-        "start": BENT,
         "waypoints": [ahead((0.1, 0, 0))],
         "max_step_m": 0.01,
     }
     with pytest.raises(PlanningError) as caught:
-        straight_line(solver, **(arguments | changes))
+        straight_line(PoseFollower(solver, "flange", BENT), **(arguments | changes))
     assert text in caught.value.reason
+
+
+def test_a_link_that_does_not_exist_is_refused(solver: InverseKinematics) -> None:
+    with pytest.raises(PlanningError, match="nobody"):
+        PoseFollower(solver, "nobody", BENT)
 
 
 def test_the_curve_that_touches_something_is_run_with_stops_or_not_at_all(
     solver: InverseKinematics, seven: RobotModel
 ) -> None:
-    rows = straight_line(solver, "flange", BENT, [ahead((0.03, 0, 0))], 0.01).rows
+    rows = straight_line(PoseFollower(solver, "flange", BENT), [ahead((0.03, 0, 0))], 0.01).rows
     verdicts = iter([False, True])
     motion = time_line(solver.group.joints, rows, seven.max_velocity, seven.max_acceleration, lambda _: next(verdicts))
     still = np.abs(motion.velocities).max(axis=1) < 1e-9
@@ -139,7 +142,7 @@ def test_the_curve_that_touches_something_is_run_with_stops_or_not_at_all(
 
 def test_seven_joints_end_a_line_at_joint_values_and_blend(seven: RobotModel) -> None:
     kinematics, settings = KinematicsPool(seven), PipelineSettings()
-    pipeline = PlanningPipeline(seven, kinematics, settings, CommandPlanner(LIMITS), ())
+    pipeline = PlanningPipeline(kinematics, settings, CommandPlanner(LIMITS), adapters=())
     scene = empty_scene(seven, BENT)
     first = PlanningRequest(
         scene, "arm", (PoseGoal("flange", ahead((0.15, 0, 0))),), "LIN", velocity_scaling=0.2, acceleration_scaling=0.2

@@ -87,7 +87,7 @@ def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
     model: RobotModel, robot: object, pool: KinematicsPool
 ) -> None:
     planner, asked = Coarse(), request(model)
-    answer = PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
+    answer = PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(asked)
     assert len(planner.asked) == 1 and len(answer.path) > 2
     second = IndependentChecker(robot.urdf, robot.srdf, package_resolver)
     second.set_world([("board", box(*THIN), pin.SE3(np.eye(3), BOARD_AT).homogeneous)])
@@ -100,7 +100,7 @@ def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
 
 def test_what_could_not_be_repaired_is_named_with_bodies_and_state(model: RobotModel, pool: KinematicsPool) -> None:
     with pytest.raises(PlanningError) as caught:
-        PlanningPipeline(model, pool, PipelineSettings(seed=1), Stubborn(), make_adapters()).plan(request(model))
+        PlanningPipeline(pool, PipelineSettings(seed=1), Stubborn(), adapters=make_adapters()).plan(request(model))
     assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN
     for word in ("edge 1 of 1", "'board'", "mm deep", "shoulder_pan_joint"):
         assert word in caught.value.reason, caught.value.reason
@@ -116,19 +116,21 @@ def test_a_later_search_without_a_path_does_not_hide_what_the_first_one_failed_b
             return super().plan(problem)
 
     with pytest.raises(PlanningError, match="Once found no path.*a path was found before, but edge 1 of 1.*'board'"):
-        PlanningPipeline(model, pool, PipelineSettings(seed=1), Once(), make_adapters()).plan(request(model))
+        PlanningPipeline(pool, PipelineSettings(seed=1), Once(), adapters=make_adapters()).plan(request(model))
 
 
 def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_later_begin(
     model: RobotModel, pool: KinematicsPool
 ) -> None:
     planner = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
+    PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(
+        request(model, board=False)
+    )
     problem = planner.asked[0]
     assert problem.begun_s < problem.deadline_s < problem.end_s == pytest.approx(problem.begun_s + 60.0)
     assert problem.end_s - problem.deadline_s == pytest.approx(0.25)
     improving = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), improving, make_adapters()).plan(
+    PlanningPipeline(pool, PipelineSettings(seed=1), improving, adapters=make_adapters()).plan(
         replace(request(model, board=False), planner_id="BITstar")
     )
     assert improving.asked[0].end_s - improving.asked[0].deadline_s == pytest.approx(1.0), "it always uses all its time"
@@ -171,7 +173,7 @@ def test_a_goal_a_hair_beyond_a_bound_ends_on_the_bound(model: RobotModel, pool:
 
 
 def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotModel, pool: KinematicsPool) -> None:
-    pipeline = PlanningPipeline(model, pool, PipelineSettings(), CommandPlanner(None), ())
+    pipeline = PlanningPipeline(pool, PipelineSettings(), CommandPlanner(None), adapters=())
     inside = request(model)
     tip = model.link_transforms(
         model.merge(inside.scene.positions, dict(zip(model.group(GROUP).joints, GOAL, strict=True)))
@@ -193,7 +195,7 @@ def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotMo
 def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: KinematicsPool) -> None:
     planner = Coarse()
     asked = request(model)
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(asked)
+    PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(asked)
     problem = planner.asked[0]
     way = OmplPlanner.repaired(problem, np.array([START, GOAL, START]))
     checker = ExactCollisionChecker(asked.scene, problem.group.indices)
@@ -217,7 +219,9 @@ def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock
 
     monkeypatch.setattr(ConstrainedMotion, "steps_towards", watched)
     planner = Coarse()
-    PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
+    PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(
+        request(model, board=False)
+    )
     problem = planner.asked[0]
     tip = problem.group.tip_link
     frame = model.pin_model.frames[model.frame_ids[tip]]
@@ -277,13 +281,10 @@ def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel,
     def found(*goals: object) -> np.ndarray:
         return GoalResolver(
             replace(asked, goals=goals),
-            model.group(GROUP),
             pool,
-            checker,
             motion,
             np.random.default_rng(1),
-            None,
-            lambda: True,
+            must_stop=lambda: True,
         ).resolve()
 
     assert len(found(*free, hit, hit)) == 1

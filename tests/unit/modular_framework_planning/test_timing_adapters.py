@@ -80,7 +80,7 @@ def planned(
     settings = PipelineSettings(
         parameters=parameters or {}, default_velocity_scaling_factor=0.1, default_acceleration_scaling_factor=0.2
     )
-    pipeline = PlanningPipeline(model, KinematicsPool(model), settings, planner or OverTwoPoints(), adapters)
+    pipeline = PlanningPipeline(KinematicsPool(model), settings, planner or OverTwoPoints(), adapters=adapters)
     joints = model.group(GROUP).joints
     return pipeline.plan(
         PlanningRequest(

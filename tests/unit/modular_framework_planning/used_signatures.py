@@ -91,7 +91,7 @@ def use(model: RobotModel) -> None:
     kinematics = KinematicsPool(model)
     settings = PipelineSettings(seed=1, parameters={"num_iterations": 5})
     for planner in (OmplPlanner(), StompPlanner.configure(model, settings)):
-        pipeline = PlanningPipeline(model, kinematics, settings, planner, make_adapters())
+        pipeline = PlanningPipeline(kinematics, settings, planner, adapters=make_adapters())
         for constraints in (None, upright(scene, group.tip_link)):
             request = PlanningRequest(
                 scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0, path_constraints=constraints

@@ -51,7 +51,7 @@ class GraspReach:
         ):
             try:
                 solutions = self._solver.solutions(
-                    self._solver.group.tip_link, pin.SE3(rotation, np.asarray(position)), seed, math.inf
+                    self._solver.group.tip_link, pin.SE3(rotation, np.asarray(position)), seed, timeout_s=math.inf
                 )
             except PlanningError:
                 return None

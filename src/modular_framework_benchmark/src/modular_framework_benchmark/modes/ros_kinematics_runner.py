@@ -151,7 +151,7 @@ def _solve_poses(robot: Robot, solver: InverseKinematics, spec: EpisodeSpec) -> 
     for _ in range(int(spec.settings.get("poses", 100))):
         target = _reachable_pose(robot, solver.group, generator)
         start = time.perf_counter()
-        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s)
+        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s=timeout_s)
         results.append(_check_solution(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
     return results
 

@@ -15,7 +15,6 @@ import pinocchio as pin
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
@@ -90,11 +89,10 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
 
 
 def straight_line(
-    solver: InverseKinematics,
-    link: str,
-    start: Array,
+    follower: PoseFollower,
     waypoints: Sequence[Transform],
     max_step_m: float,
+    *,
     jumps: JumpThresholds = NO_JUMP_TEST,
     objection: Objection = no_objection,
     carried: Transform | None = None,
@@ -102,9 +100,7 @@ def straight_line(
     """Follows straight lines through waypoints until something is in the way.
 
     Args:
-        solver: inverse kinematics of the group.
-        link: what follows the lines, or carries what follows them; rigidly fixed to the end of the group's chain.
-        start: positions of the whole robot.
+        follower: kinematics of the link that follows the lines, or carries what follows them, from its rest state.
         waypoints: poses in the planning frame of what follows the lines.
         max_step_m: longest step [m].
         jumps: what counts as a jump.
@@ -112,12 +108,11 @@ def straight_line(
         carried: pose, in the link's frame, of what follows the lines (a held object); None: the link itself does.
 
     Raises:
-        PlanningError: the step is not above 0 or gives more than 50,000 steps, a threshold is below 0, there is no
-            waypoint, or the link is not moved by the group.
+        PlanningError: the step is not above 0 or gives more than 50,000 steps, a threshold is below 0, or there is no
+            waypoint.
     """
     _require_usable(waypoints, max_step_m, jumps)
-    follower = PoseFollower(solver, link, start)
-    rows = [np.array(start[follower.group.indices], dtype=float)]
+    rows = [follower.rest[follower.group.indices]]
     reached: list[int] = []
     to_link = pin.SE3.Identity() if carried is None else carried.inverse()
     poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]

@@ -96,10 +96,9 @@ def scene_bodies(
         shapes.append(bounding_geometry_of(parts[index]))
         check_interrupt()
     other_arrays = _single_bodies(shapes, [parts[index] for index in others.tolist()])
-    with_surface, has_surface = (
-        list(links.with_surface),
-        _need_surface(links, other_arrays, shapes, parts, others, pairs),
-    )
+    has_triangles = np.array([shape.triangles is not None for shape in shapes], dtype=bool)
+    has_surface = has_triangles & _need_surface(links, other_arrays, parts, others, pairs)
+    with_surface = list(links.with_surface)
     for row in np.flatnonzero(has_surface).tolist():
         if shapes[row].surface is not None:  # builds the surface on first use
             with_surface.append(shapes[row])
@@ -279,12 +278,11 @@ def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tup
 def _need_surface(
     links: _Links,
     arrays: BodyArrays,
-    shapes: Sequence[BoundingGeometry],
     parts: Sequence[PlacedGeometry],
     others: NDArray[np.int64],
     pairs: WatchedPairs,
 ) -> NDArray[np.bool_]:
-    """Returns whether each held object and body of the world needs a surface.
+    """Returns whether each held object and body of the world with triangles needs a surface.
 
     A solid of the world is checked in closed form against bodies with a (nearly) exact surface. Its triangles would
     not be used, and building a tree over triangles takes longer than many plans.
@@ -295,5 +293,4 @@ def _need_surface(
     is_inexact[: len(links.is_inexact)], is_inexact[others] = links.is_inexact, arrays.surface_excess > SMALL_EXCESS
     for part, other in (pairs.parts.T, pairs.parts.T[::-1]):
         is_needed[part[is_plain[part] & (is_inexact[other] | is_plain[other])]] = True
-    has_surface = np.array([shape.triangles is not None for shape in shapes], dtype=bool)
-    return np.asarray((is_needed[others] | ~is_plain[others]) & has_surface)
+    return np.asarray(is_needed[others] | ~is_plain[others])

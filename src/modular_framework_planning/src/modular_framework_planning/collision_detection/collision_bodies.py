@@ -131,16 +131,17 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         part.body if part.body.kind != WORLD or part.body.name in named else UNNAMED for part in parts[links:]
     )
     joint_ids, margins = tuple([part.joint_id for part in parts]), tuple([part.margin for part in parts])
-    return _watched_pairs(scene.model, moving_joints, *scene.acm.verdicts, others, joint_ids, margins)
+    verdicts = scene.acm.verdicts
+    return _watched_pairs(scene.model, moving_joints, verdicts, others, joint_ids=joint_ids, margins=margins)
 
 
 @lru_cache(maxsize=PAIR_CACHE_SIZE)
 def _watched_pairs(
     model: RobotModel,
     moving: tuple[int, ...] | None,
-    entries: frozenset[tuple[frozenset[str], bool]],
-    defaults: frozenset[tuple[str, bool]],
+    verdicts: tuple[frozenset[tuple[frozenset[str], bool]], frozenset[tuple[str, bool]]],
     others: tuple[Body, ...],
+    *,
     joint_ids: tuple[int, ...],
     margins: tuple[float, ...],
 ) -> WatchedPairs:
@@ -149,12 +150,12 @@ def _watched_pairs(
     Args:
         model: Robot model.
         moving: Indices of the joints that will move; None for all joints.
-        entries: Entries of the allowed collision matrix.
-        defaults: Default entries of the matrix.
+        verdicts: Entries and default entries of the allowed collision matrix.
         others: Bodies of the geometries that are not links, bodies of the world last.
         joint_ids: PlacedGeometry.joint_id of all geometries.
         margins: PlacedGeometry.margin of all geometries.
     """
+    entries, defaults = verdicts
     self_pairs = _link_pairs(model, moving, entries, defaults)
     if not others:
         return self_pairs

@@ -137,6 +137,7 @@ class InverseKinematics:
         tip_link: str,
         target: Transform,
         seed: Array,
+        *,
         timeout_s: float | None = None,
         rng: Generator | None = None,
         bounds: tuple[Array, Array] | None = None,
@@ -390,7 +391,7 @@ class KinematicsPool:
             model: Robot model.
             settings: Kinematics settings, keyed by group name.
         """
-        self._model = model
+        self.model = model
         self._settings = dict(settings or {})
         self._solvers: dict[str, InverseKinematics] = {}
 
@@ -398,5 +399,5 @@ class KinematicsPool:
         """Returns the solver of a group; raises PlanningError for a group that is not a chain."""
         if group not in self._solvers:
             settings = self._settings.get(group, KinematicsSettings())
-            self._solvers[group] = InverseKinematics(self._model, self._model.group(group), settings)
+            self._solvers[group] = InverseKinematics(self.model, self.model.group(group), settings)
         return self._solvers[group]

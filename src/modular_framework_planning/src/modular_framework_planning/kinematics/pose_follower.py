@@ -59,7 +59,7 @@ class PoseFollower:
         self.group: JointGroup = solver.group
         self.link = link
         self._solver = solver
-        self._rest = np.array(rest, dtype=float)
+        self.rest = np.array(rest, dtype=float)
         self._members = frozenset(int(index) for index in self.group.indices)
         self._followers = [
             (follower, self.group.joints.index(self.model.joint_names[leader]), multiplier)
@@ -71,7 +71,7 @@ class PoseFollower:
 
     def full_positions(self, values: Array) -> Array:
         """Returns the positions of the whole robot for joint values of the group."""
-        positions = self._rest.copy()
+        positions = self.rest.copy()
         positions[self.group.indices] = values
         return self.model.with_mimics(positions, self._members) if self._followers else positions
 

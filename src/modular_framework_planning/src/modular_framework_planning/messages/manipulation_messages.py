@@ -186,7 +186,7 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
 
 
 def place_manoeuvre(
-    scene: PlanningScene, goal: Any, location: Any, hand: Hand, held: AttachedObject, where: str
+    scene: PlanningScene, goal: Any, location: Any, *, hand: Hand, held: AttachedObject, where: str
 ) -> Manoeuvre:
     """Reads one PlaceLocation of a PlaceGoal.
 

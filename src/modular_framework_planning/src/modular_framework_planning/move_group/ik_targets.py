@@ -60,7 +60,7 @@ class IkTarget:
             return solver.position_solutions(
                 self.link, self.offset.translation, self.target.translation, seed, timeout_s
             )
-        return solver.solutions(self.link, self.target * self.offset.inverse(), seed, timeout_s)
+        return solver.solutions(self.link, self.target * self.offset.inverse(), seed, timeout_s=timeout_s)
 
     def constraints(
         self, scene: PlanningScene, position_only: bool
@@ -243,6 +243,7 @@ def sampled_solutions(
     group: JointGroup,
     targets: Sequence[IkTarget],
     solvers: Sequence[InverseKinematics],
+    *,
     constraints: KinematicConstraints,
     end_s: float,
 ) -> Iterator[Array]:

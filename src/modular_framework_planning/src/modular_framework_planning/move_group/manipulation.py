@@ -213,9 +213,9 @@ class Manipulation:
             arm,
             self._context.plan,
             request,
-            settings.start_state_contact_tolerance,
-            self._context.settings.pick_place,
-            self._context.new_checker,
+            contact_tolerance_m=settings.start_state_contact_tolerance,
+            settings=self._context.settings.pick_place,
+            new_checker=self._context.new_checker,
         )
 
     # ---------------------------------------------------------------- execution

@@ -76,7 +76,9 @@ class WatchedMotion:
             times = np.array(times) / context.execution.settings.execution_velocity_scaling
             scene, was_planned = self._as_planned(planned_in), change is not None
             self._rows = rows
-            self._watch = PathWatch(self._joints, times, rows, scene, context.new_checker, was_planned)
+            self._watch = PathWatch(
+                self._joints, times, rows, scene, new_checker=context.new_checker, was_planned=was_planned
+            )
         self._seen_version = planned_in.geometry_version
         self._watching = threading.Lock()
         self._done = threading.Event()

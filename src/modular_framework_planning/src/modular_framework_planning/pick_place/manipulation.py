@@ -25,6 +25,7 @@ from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contac
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.kinematics.solution_choice import first_free
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
@@ -156,6 +157,7 @@ class ManoeuvrePlanner:
         arm: Arm,
         plan: Callable[[PlanningRequest], PlanningAnswer],
         request: PlanningRequest,
+        *,
         contact_tolerance_m: float,
         settings: PickPlaceSettings,
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
@@ -293,9 +295,7 @@ class ManoeuvrePlanner:
     def _line(self, scene: PlanningScene, end: Transform) -> StraightLine:
         """Solves a straight line from the robot's pose in the scene."""
         return straight_line(
-            self._arm.solver,
-            self._arm.link,
-            scene.positions,
+            PoseFollower(self._arm.solver, self._arm.link, scene.positions),
             [end],
             self._settings.cartesian_motion_step_size,
             objection=self._objection(scene),

@@ -18,7 +18,6 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
 from modular_framework_planning.kinematics.solution_choice import first_free
-from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
     ConstraintGoal,
@@ -27,7 +26,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PoseGoal,
     group_bounds,
 )
-from modular_framework_planning.robot_model.robot_model import GOAL_BOUNDS_TOLERANCE, JointGroup
+from modular_framework_planning.robot_model.robot_model import GOAL_BOUNDS_TOLERANCE
 
 MAX_GOAL_STATES = 8
 MAX_SAMPLES = 64  # states tried within the tolerances of a goal
@@ -40,11 +39,10 @@ class GoalResolver:
     def __init__(
         self,
         request: PlanningRequest,
-        group: JointGroup,
         kinematics: KinematicsPool,
-        checker: CollisionChecker,
         motion: MotionChecker,
         rng: np.random.Generator,
+        *,
         path_constraints: KinematicConstraints | None = None,
         must_stop: Callable[[], bool] = lambda: False,
     ) -> None:
@@ -52,19 +50,18 @@ class GoalResolver:
 
         Args:
             request: Planning request with the goals.
-            group: Joints of the planning group.
             kinematics: Kinematics solvers of all groups.
-            checker: Collision checker of the whole robot.
             motion: Motion checker of the group.
             rng: Random generator.
             path_constraints: Path constraints that goal states must satisfy.
             must_stop: Returns True to skip the remaining goals.
         """
         self._must_stop = must_stop
-        self._request, self._group, self._kinematics = request, group, kinematics
-        self._checker, self._motion, self._rng = checker, motion, rng
+        self._request, self._kinematics = request, kinematics
+        self._checker, self._motion, self._rng = motion.checker, motion, rng
         self._path_constraints = path_constraints
         self._model = request.scene.model
+        self._group = group = self._model.group(request.group)
         self._start = request.scene.positions[group.indices]
         self._bounds = group_bounds(self._model, group, request.workspace)
 
@@ -203,7 +200,9 @@ class GoalResolver:
             solver = self._kinematics.solver(self._group.name)
             if solver.settings.position_only:
                 return self._position(goal, solver)
-            solutions = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng, self._bounds)
+            solutions = solver.solutions(
+                goal.link, goal.target, seed, timeout_s=math.inf, rng=self._rng, bounds=self._bounds
+            )
         except PlanningError:
             if allowed is None:
                 raise
@@ -258,7 +257,9 @@ class GoalResolver:
         result: list[Array] = []
         for _ in range(MAX_POSES):
             target = allowed.pose_target(seed, self._rng) * to_link
-            solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng, self._bounds)
+            solutions = solver.solutions(
+                goal.link, target, seed, timeout_s=math.inf, rng=self._rng, bounds=self._bounds
+            )
             result += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
         return result
 

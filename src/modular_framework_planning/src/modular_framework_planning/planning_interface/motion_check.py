@@ -30,6 +30,7 @@ class MotionChecker:
     Finely checked edges are remembered; pieces of a path on a free edge are not checked again.
 
     Attributes:
+        checker: Collision checker of the scene.
         memory: Remembered edges.
     """
 
@@ -44,7 +45,7 @@ class MotionChecker:
             rest: Positions of the whole robot, used for the joints outside the group [rad or m].
             remembered_step: Maximum step of the checks whose edges are remembered [rad or m].
         """
-        self._checker = checker
+        self.checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
         self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
@@ -59,7 +60,7 @@ class MotionChecker:
         """Returns the positions of the whole robot for a joint vector of the group."""
         result = self._rest.copy()
         result[self._indices] = values
-        return self._checker.model.with_mimics(result, self._mimic_leaders) if self._mimic_leaders else result
+        return self.checker.model.with_mimics(result, self._mimic_leaders) if self._mimic_leaders else result
 
     def edges(self, step: float) -> GroupEdges:
         """Returns the group's edge check for compiled loops, with a maximum joint displacement of `step` [rad or m]."""
@@ -72,9 +73,9 @@ class MotionChecker:
     def state_is_free(self, values: Array) -> bool:
         """Checks that a joint vector of the group is free of collisions."""
         if self._mimic_leaders:
-            return self._checker.is_free(self.full_positions(values))
+            return self.checker.is_free(self.full_positions(values))
         self._state[0, self._indices] = values
-        return self._checker.path_is_free(self._state, 1.0)
+        return self.checker.path_is_free(self._state, 1.0)
 
     def edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         """Checks that a straight edge is free, including its end but not its start.
@@ -94,19 +95,19 @@ class MotionChecker:
 
     def _edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         if self._mimic_leaders:
-            return self._checker.path_is_free(self.full_path(np.array([start, end])), step, 1)
+            return self.checker.path_is_free(self.full_path(np.array([start, end])), step, 1)
         edge = self._edge
         edge[0, self._indices], edge[1, self._indices] = start, end
-        return self._checker.path_is_free(edge, step, 1)
+        return self.checker.path_is_free(edge, step, 1)
 
     def polyline_is_free(self, polyline: Array, step: float) -> bool:
         """Checks that a polyline is free, including its start, without using remembered edges."""
-        return self._checker.path_is_free(self.full_path(polyline), step)
+        return self.checker.path_is_free(self.full_path(polyline), step)
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding state of a polyline, including its start, or None."""
         for piece in self._unchecked(polyline, step):
-            state = self._checker.colliding_state(self.full_path(piece), step)
+            state = self.checker.colliding_state(self.full_path(piece), step)
             if state is not None:
                 return state[self._indices]
         return None

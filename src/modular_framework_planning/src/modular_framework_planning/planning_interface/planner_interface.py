@@ -147,13 +147,11 @@ class PlanningProblem:
                 self._goals.append(
                     GoalResolver(
                         self.request,
-                        self.group,
                         self.kinematics,
-                        self.checker,
                         self.motion,
                         self.rng,
-                        self.constraints,
-                        self._must_stop_resolving,
+                        path_constraints=self.constraints,
+                        must_stop=self._must_stop_resolving,
                     ).resolve()
                 )
         return self._goals[0]

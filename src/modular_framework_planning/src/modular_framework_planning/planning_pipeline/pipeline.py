@@ -41,7 +41,7 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 from modular_framework_planning.planning_pipeline.path_search import PathSearch
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
-from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_ros.allowed_names import nearest
 
 RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # part of the allowed time reserved for repair, timing and validation
@@ -55,10 +55,10 @@ class PlanningPipeline:
 
     def __init__(
         self,
-        model: RobotModel,
         kinematics: KinematicsPool,
         settings: PipelineSettings,
         planner: Planner,
+        *,
         adapters: Sequence[RequestAdapter] = (),
         name: str = "ompl",
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
@@ -74,7 +74,7 @@ class PlanningPipeline:
             name: Name of the pipeline (`pipeline_id`).
             new_checker: Factory of collision checkers.
         """
-        self._model = model
+        self._model = kinematics.model
         self._kinematics = kinematics
         self._planner = planner
         self._adapters = tuple(adapters)

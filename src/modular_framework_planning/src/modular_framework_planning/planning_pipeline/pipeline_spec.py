@@ -45,13 +45,12 @@ class PipelineSpec:
     def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
         """Returns the pipeline; raises PlanningError for an unknown name or an invalid parameter."""
         return PlanningPipeline(
-            model,
             kinematics,
             self.settings,
             make_planner(self.planner, model, self.settings),
-            make_adapters(self.adapters),
-            self.name,
-            collision_detector(self.collision_detector),
+            adapters=make_adapters(self.adapters),
+            name=self.name,
+            new_checker=collision_detector(self.collision_detector),
         )
 
 

@@ -120,7 +120,7 @@ def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
     compile_all()
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
-    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _StraightLinePlanner(), make_adapters())
+    straight = PlanningPipeline(kinematics, PipelineSettings(), _StraightLinePlanner(), adapters=make_adapters())
     for group in model.groups.values():
         if not group.joints:
             continue

@@ -44,6 +44,7 @@ class PathWatch:
         times: Array,
         rows: Array,
         planned_in: PlanningScene,
+        *,
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
         was_planned: bool = True,
     ) -> None:

@@ -61,7 +61,7 @@ def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Arra
 
 
 def _straight_line(
-    joint_names: tuple[str, ...], start: Array, end: Array, velocity: Array, acceleration: Array, jerk: Array
+    joint_names: tuple[str, ...], start: Array, end: Array, *, velocity: Array, acceleration: Array, jerk: Array
 ) -> Trajectory:
     """Returns Ruckig's fastest motion from rest to rest along a line."""
     length = float(np.linalg.norm(end - start))
@@ -109,7 +109,10 @@ def along_straight_lines(
         return Trajectory(joint_names, np.zeros(1), distinct, still, still)
     parts = [
         slowed_to_limits(
-            _straight_line(joint_names, start, end, velocity, acceleration, jerk), velocity, acceleration, jerk
+            _straight_line(joint_names, start, end, velocity=velocity, acceleration=acceleration, jerk=jerk),
+            velocity,
+            acceleration,
+            jerk,
         )
         for start, end in zip(distinct[:-1], distinct[1:], strict=True)
     ]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -24,32 +25,40 @@ EASE_S = 0.1  # duration of the transition on both sides of a slowed stretch
 MAX_SLOWED_PERIOD_S = 2.5 * MAX_PERIOD_S
 
 
-def link_speeds(
-    model: RobotModel,
-    trajectory: Trajectory,
-    full_positions: Callable[[Array], Array],
-    frame: FrameOnRobot,
-    times: Array,
-) -> Array:
+@dataclass(frozen=True, slots=True)
+class MovedFrame:
+    """A frame that a trajectory moves.
+
+    Attributes:
+        model: Robot model.
+        frame: A link, a held object or its subframe.
+        full_positions: Returns the positions of the whole robot for a joint vector.
+    """
+
+    model: RobotModel
+    frame: FrameOnRobot
+    full_positions: Callable[[Array], Array]
+
+
+def frame_speeds(moved: MovedFrame, trajectory: Trajectory, times: Array) -> Array:
     """Returns the speeds of a frame's origin, shape (m,) [m/s].
 
     Args:
-        model: Robot model.
+        moved: Frame.
         trajectory: Trajectory of the moving joints.
-        full_positions: Returns the positions of the whole robot for a joint vector.
-        frame: A link, a held object or its subframe.
         times: Sample times, shape (m,) [s].
     """
+    model = moved.model
     positions, velocities, _, _ = trajectory.sample(times)
     indices = [model.index[name] for name in trajectory.joint_names]
-    data = model.pin_model.createData()
+    data, frame = model.pin_model.createData(), moved.frame
     result = np.empty(len(times))
     for index, (values, rates) in enumerate(zip(positions, velocities, strict=True)):
         all_rates = np.zeros(len(model.joint_names))
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:
             all_rates[follower] = multiplier * all_rates[leader]
-        pin.computeJointJacobians(model.pin_model, data, full_positions(values))
+        pin.computeJointJacobians(model.pin_model, data, moved.full_positions(values))
         jacobian = pin.getFrameJacobian(
             model.pin_model, data, frame.joint, frame.placement, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
@@ -101,21 +110,13 @@ def _slowed_smoothly(trajectory: Trajectory, times: Array, slowing: Array) -> Tr
 
 
 def with_limited_link_speed(
-    model: RobotModel,
-    trajectory: Trajectory,
-    full_positions: Callable[[Array], Array],
-    frame: FrameOnRobot,
-    max_speed: float,
-    velocity: Array,
-    acceleration: Array,
+    trajectory: Trajectory, moved: MovedFrame, max_speed: float, velocity: Array, acceleration: Array
 ) -> Trajectory:
     """Returns the trajectory along the same curve with a limited link speed.
 
     Args:
-        model: Robot model.
         trajectory: Trajectory of the moving joints.
-        full_positions: Returns the positions of the whole robot for a joint vector.
-        frame: A link, a held object or its subframe.
+        moved: Frame with limited speed.
         max_speed: Speed limit, above 0 [m/s].
         velocity: Joint velocity limits, shape (joints,) [rad/s or m/s].
         acceleration: Joint acceleration limits, shape (joints,) [rad/s^2 or m/s^2].
@@ -124,10 +125,10 @@ def with_limited_link_speed(
         return trajectory
     speed_limit = max_speed * (1.0 - MARGIN)
     times = trajectory.sample_times(min(SAMPLE_PERIOD_S, trajectory.duration_s / 20.0))
-    slowing = link_speeds(model, trajectory, full_positions, frame, times) / speed_limit
+    slowing = frame_speeds(moved, trajectory, times) / speed_limit
     if slowing.max() <= 1.0:
         return trajectory
     slowed = _slowed_smoothly(trajectory, times, slowing)
-    excess = float(link_speeds(model, slowed, full_positions, frame, slowed.sample_times()).max()) / speed_limit
+    excess = float(frame_speeds(moved, slowed, slowed.sample_times()).max()) / speed_limit
     factor = max(excess, required_slowdown(slowed, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
     return slowed.slowed(max(factor, 1.0))

@@ -67,6 +67,7 @@ def parameterize(
     blends: Array,
     velocity: Array,
     acceleration: Array,
+    *,
     max_period_s: float = MAX_PERIOD_S,
 ) -> Trajectory:
     """Returns the time-optimal trajectory along a polyline with blends.

@@ -22,6 +22,7 @@ from modular_framework_planning.constraints.robot_frames import frame_on_robot, 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.conversions import scene_with_state, state_message, trajectory_message
 from modular_framework_planning.messages.multi_dof import names_joints
@@ -33,7 +34,7 @@ from modular_framework_planning.planning_interface.motion_check import MotionChe
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
-from modular_framework_planning.trajectory_processing.link_speed import with_limited_link_speed
+from modular_framework_planning.trajectory_processing.link_speed import MovedFrame, with_limited_link_speed
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 
@@ -68,16 +69,14 @@ class CartesianPathService(ServiceCapability):
         try:
             lines = self._read(request)
             found = straight_line(
-                lines.solver,
-                lines.link,
-                lines.scene.positions,
+                PoseFollower(lines.solver, lines.link, lines.scene.positions),
                 lines.waypoints,
                 request.max_step,
-                JumpThresholds(
+                jumps=JumpThresholds(
                     request.jump_threshold, request.prismatic_jump_threshold, request.revolute_jump_threshold
                 ),
-                self._objection(lines, request),
-                lines.offset,
+                objection=self._objection(lines, request),
+                carried=lines.offset,
             )
             trajectory = self._timed(lines, found, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
@@ -146,10 +145,8 @@ class CartesianPathService(ServiceCapability):
             return trajectory
         name = request.cartesian_speed_limited_link or lines.follower
         require_holding_link(lines.scene, name, "cartesian_speed_limited_link")
-        frame = frame_on_robot(lines.scene, name)
-        return with_limited_link_speed(
-            model, trajectory, lines.motion.full_positions, frame, request.max_cartesian_speed, velocity, acceleration
-        )
+        frame = MovedFrame(model, frame_on_robot(lines.scene, name), lines.motion.full_positions)
+        return with_limited_link_speed(trajectory, frame, request.max_cartesian_speed, velocity, acceleration)
 
 
 def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:

@@ -104,7 +104,7 @@ class KinematicsService(MoveGroupCapability):
             end_s = start + (
                 sum(solver.settings.total_timeout_s for solver in solvers) if timeout_s is None else timeout_s
             )
-            for positions in sampled_solutions(scene, group, targets, solvers, constraints, end_s):
+            for positions in sampled_solutions(scene, group, targets, solvers, constraints=constraints, end_s=end_s):
                 if checker is None or checker.is_free(positions):
                     return positions
         tips = f"{len(found)} inverse kinematics solutions for {', '.join(links)}"

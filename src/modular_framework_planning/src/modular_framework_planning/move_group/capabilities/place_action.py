@@ -23,7 +23,9 @@ class PlaceAction(ManipulationAction):
     def _task(self, goal: PlaceGoal, result: PlaceResult) -> Task:
         def read(scene: PlanningScene, index: int, hand: Hand) -> Manoeuvre:
             held = held_object(scene, goal.attached_object_name, hand)
-            return place_manoeuvre(scene, goal, goal.place_locations[index], hand, held, f"place_locations[{index}]")
+            return place_manoeuvre(
+                scene, goal, goal.place_locations[index], hand=hand, held=held, where=f"place_locations[{index}]"
+            )
 
         def accept(index: int) -> None:
             result.place_location = goal.place_locations[index]

@@ -29,7 +29,12 @@ from modular_framework_planning.planners.ompl.planner_settings import (
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
 from modular_framework_planning.planners.rrt_connect.aorrtc import Aorrtc
-from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, can_search
+from modular_framework_planning.planners.rrt_connect.rrt_connect import (
+    ParallelSearch,
+    RrtConnect,
+    TreeGrowth,
+    can_search,
+)
 from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
@@ -164,19 +169,17 @@ def _search(
         return Aorrtc(problem, goals, connection_range(parameters) or DEFAULT_RANGE, iteration_limit)
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
         configured_range = connection_range(parameters)
+        growth = TreeGrowth(
+            check_step=step,
+            max_extension=configured_range or DEFAULT_RANGE,
+            extension_limit=iteration_limit,
+            is_weighted=configured_range is None,
+        )
         generators = [problem.rng, *problem.rng.spawn(search_threads(problem) - 1)]
         return ParallelSearch(
             problem,
             [
-                RrtConnect(
-                    replace(problem, rng=rng),
-                    goals,
-                    step,
-                    configured_range or DEFAULT_RANGE,
-                    iteration_limit,
-                    configured_range is None,
-                    index,
-                )
+                RrtConnect(replace(problem, rng=rng), goals, growth, search_index=index)
                 for index, rng in enumerate(generators)
             ],
         )

@@ -149,7 +149,7 @@ def blend(
     blend_s = max(remaining_s, exit_s)
     transition = Transition(first, second, follower, entry_s, exit_s - blend_s, blend_s)
     start, end = state_at(first, entry_s), state_at(second, exit_s)
-    middle = follow(transition, follower, period_s, start, end, transition.posture)
+    middle = follow(transition, follower, period_s, start=start, end=end, posture=transition.posture)
     deviation = np.abs(middle.positions[-1] - end.positions)
     if deviation.max() > SAME_POSTURE:
         raise PlanningError(

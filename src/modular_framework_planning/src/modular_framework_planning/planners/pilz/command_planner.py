@@ -119,7 +119,7 @@ class CommandPlanner:
         target = _target(problem)
         follower = PoseFollower(solver, target.link, problem.start)
         path = _path(problem, follower.pose(problem.start_values), target.pose)
-        return along_path(path, follower, problem.start_values, limits, settings, target.values)
+        return along_path(path, follower, problem.start_values, limits, settings=settings, goal=target.values)
 
     def _require_limits(self, planner_id: str) -> CartesianLimits:
         if self._limits is None:

@@ -73,6 +73,7 @@ def along_path(
     follower: PoseFollower,
     start: Array,
     limits: CartesianLimits,
+    *,
     settings: MotionSettings,
     goal: Array | None = None,
 ) -> Trajectory:
@@ -95,7 +96,7 @@ def along_path(
         trajectory = standstill(follower.group.joints, start)
     else:
         posture = None if goal is None else _posture_between(motion, start, goal)
-        trajectory = follow(motion, follower, settings.period_s, at_rest(start), posture=posture)
+        trajectory = follow(motion, follower, settings.period_s, start=at_rest(start), posture=posture)
     if goal is not None:
         require_posture(trajectory, goal)
     return trajectory

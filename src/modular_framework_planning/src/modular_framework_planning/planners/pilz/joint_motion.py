@@ -124,6 +124,7 @@ def follow(
     motion: PoseMotion,
     follower: PoseFollower,
     period_s: float,
+    *,
     start: JointState,
     end: JointState | None = None,
     posture: Posture | None = None,
@@ -148,7 +149,7 @@ def follow(
     for low, high in zip(points[:-1], points[1:], strict=True):
         count = int(np.ceil((high - low) / max_gap_s))
         for time_s in low + (high - low) * np.arange(1, count + 1) / count:
-            state = _advance(motion, follower, state, float(time_s), (high - low) / count, posture)
+            state = _advance(motion, follower, state, time_s=float(time_s), gap_s=(high - low) / count, posture=posture)
             limits.require(time_s, state.velocities, state.accelerations)
         rows.append(state)
     rows[-1] = JointState(state.positions, end.velocities, end.accelerations) if end else at_rest(state.positions)
@@ -160,7 +161,13 @@ def follow(
 
 
 def _advance(
-    motion: PoseMotion, follower: PoseFollower, state: JointState, time_s: float, gap_s: float, posture: Posture | None
+    motion: PoseMotion,
+    follower: PoseFollower,
+    state: JointState,
+    *,
+    time_s: float,
+    gap_s: float,
+    posture: Posture | None,
 ) -> JointState:
     guess = state.positions + gap_s * (state.velocities + 0.5 * gap_s * state.accelerations)
     target = posture(time_s) if posture else None

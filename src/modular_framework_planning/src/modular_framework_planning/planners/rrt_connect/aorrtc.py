@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, TreeGrowth
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 from modular_framework_planning.planning_interface.problem_shortening import shortened
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
@@ -54,15 +54,13 @@ class Aorrtc:
         problem, step, best, bound = self._problem, self._problem.settings.finest_step, None, np.inf
         shortest = float(np.linalg.norm(self._goals - problem.start_values, axis=1).min())
         while bound > shortest:
-            search = RrtConnect(
-                problem,
-                self._goals,
-                step,
-                self._max_extension,
-                self._remaining_extensions,
+            growth = TreeGrowth(
+                check_step=step,
+                max_extension=self._max_extension,
+                extension_limit=self._remaining_extensions,
                 is_weighted=False,
-                length_bound=bound,
             )
+            search = RrtConnect(problem, self._goals, growth, length_bound=bound)
             path = ParallelSearch(problem, [search]).run()
             self.checks += search.checks
             if self._remaining_extensions is not None:

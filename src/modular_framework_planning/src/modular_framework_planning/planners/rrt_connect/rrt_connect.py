@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,6 +92,24 @@ def empty_field(field: DistanceField) -> DistanceField:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TreeGrowth:
+    """Rules by which a search grows its trees.
+
+    Attributes:
+        check_step: Distance between collision checks along an edge [rad or m].
+        max_extension: Maximum length of an extension [rad or m], weighted if `is_weighted`.
+        extension_limit: Maximum number of extensions to random states; None for no limit but time.
+        is_weighted: Whether the weight of a joint is the square root of its reach, relative to the largest
+            reach. A wrist then turns farther per extension than a shoulder. Otherwise all weights are 1.
+    """
+
+    check_step: float
+    max_extension: float
+    extension_limit: int | None = None
+    is_weighted: bool = True
+
+
 class RrtConnect:
     """A bidirectional search for a collision-free path."""
 
@@ -98,10 +117,8 @@ class RrtConnect:
         self,
         problem: PlanningProblem,
         goals: Array,
-        step: float,
-        max_extension: float,
-        extension_limit: int | None = None,
-        is_weighted: bool = True,
+        growth: TreeGrowth,
+        *,
         search_index: int = 0,
         length_bound: float = np.inf,
     ) -> None:
@@ -110,11 +127,7 @@ class RrtConnect:
         Args:
             problem: Problem that `can_search` accepts.
             goals: Goal joint vectors, shape (n, joints) [rad or m].
-            step: Distance between collision checks along an edge [rad or m].
-            max_extension: Maximum length of an extension [rad or m], weighted if `is_weighted`.
-            extension_limit: Maximum number of extensions to random states; None for no limit but time.
-            is_weighted: Whether the weight of a joint is the square root of its reach, relative to the largest
-                reach. A wrist then turns farther per extension than a shoulder. Otherwise all weights are 1.
+            growth: Rules by which the trees grow.
             search_index: Index among parallel searches. Searches above 0 fill their own distance field and counts.
             length_bound: Upper bound of the weighted path length [rad or m].
         """
@@ -136,8 +149,9 @@ class RrtConnect:
             np.maximum(self._low, ends.min(axis=0) - half_turn),
             np.minimum(self._high, ends.max(axis=0) + half_turn),
         )
-        self._space = self._search_space(world, step, max_extension, is_weighted, length_bound)
-        self._trees = _trees(start, goals, np.iinfo(np.int64).max if extension_limit is None else extension_limit)
+        self._space = self._search_space(world, growth, length_bound)
+        limit = growth.extension_limit
+        self._trees = _trees(start, goals, np.iinfo(np.int64).max if limit is None else limit)
         self._samples, self._batches = np.empty((0, len(self._low))), 0
         self._verdict, self._status = UNKNOWN, PAUSED
 
@@ -196,13 +210,11 @@ class RrtConnect:
         """Returns path vertices from the start to one of the goals, shape (n, joints), or None."""
         return ParallelSearch(self._problem, [self]).run()
 
-    def _search_space(
-        self, world: World, step: float, max_extension: float, is_weighted: bool, length_bound: float
-    ) -> Space:
-        problem = self._problem
+    def _search_space(self, world: World, growth: TreeGrowth, length_bound: float) -> Space:
+        problem, max_extension = self._problem, growth.max_extension
         count = len(self._low)
-        edges, weights = problem.motion.edges(step), np.ones(count)
-        if is_weighted:
+        edges, weights = problem.motion.edges(growth.check_step), np.ones(count)
+        if growth.is_weighted:
             weights = np.sqrt((np.abs(edges.joint_map) * reaches(world)[:, None]).max(axis=0))
             weights = np.maximum(weights / (weights.max() or 1.0), MIN_WEIGHT)
         squares = (weights * (self._local_bounds[1] - self._local_bounds[0])) ** 2

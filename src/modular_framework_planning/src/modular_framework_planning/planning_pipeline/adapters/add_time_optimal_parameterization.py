@@ -62,7 +62,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
                 blends,
                 problem.max_velocity,
                 problem.max_acceleration / divisor,
-                period,
+                max_period_s=period,
             ),
         )
 

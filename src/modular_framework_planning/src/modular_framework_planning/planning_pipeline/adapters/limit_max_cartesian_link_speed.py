@@ -12,7 +12,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
 from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_parameterization import time_path
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
-from modular_framework_planning.trajectory_processing.link_speed import with_limited_link_speed
+from modular_framework_planning.trajectory_processing.link_speed import MovedFrame, with_limited_link_speed
 
 
 class LimitMaxCartesianLinkSpeed(RequestAdapter):
@@ -42,10 +42,8 @@ class LimitMaxCartesianLinkSpeed(RequestAdapter):
         return replace(
             timed,
             trajectory=with_limited_link_speed(
-                problem.model,
                 timed.trajectory,
-                problem.motion.full_positions,
-                frame,
+                MovedFrame(problem.model, frame, problem.motion.full_positions),
                 max_speed,
                 problem.max_velocity,
                 problem.max_acceleration,
