@@ -24,6 +24,7 @@ def nearest_values(
     free: Sequence[Joint],
     start: Mapping[str, float],
     complete: Callable[[Mapping[str, float]], Mapping[str, float]],
+    *,
     rotation: Rotation,
     position: Any,
 ) -> dict[str, float]:

@@ -210,8 +210,8 @@ class GroupJointTargets(GroupSettings):
             moved,
             start,
             self._model.complete,
-            frame_to_base * rotation,
-            frame_to_base.apply(position - base_position),
+            rotation=frame_to_base * rotation,
+            position=frame_to_base.apply(position - base_position),
         )
 
 

@@ -134,7 +134,7 @@ class MessageSource(_MessageRules):
     """Creates a message from the fixed message or a userdata key, then from fields by key, then from the callback."""
 
     def __init__(
-        self, what: str, empty: Any, fixed: Any, key: str | None, slots: Iterable[str], callback: UserCallback
+        self, what: str, empty: Any, fixed: Any, *, key: str | None, slots: Iterable[str], callback: UserCallback
     ) -> None:
         """Checks and stores the mapping.
 

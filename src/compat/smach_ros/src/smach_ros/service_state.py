@@ -100,7 +100,7 @@ class ServiceState(ServerCallState):
         on_request = self._user_callback("request_cb", request_cb, request_cb_args, request_cb_kwargs)
         on_response = self._user_callback("response_cb", response_cb, response_cb_args, response_cb_kwargs)
         self._use(
-            MessageSource("request", empty_request, request, request_key, request_slots, on_request),
+            MessageSource("request", empty_request, request, key=request_key, slots=request_slots, callback=on_request),
             MessageSink("response", empty_response, response_key, response_slots, on_response),
         )
 

@@ -87,7 +87,7 @@ class SimpleActionState(ServerCallState):
         on_goal = self._user_callback("goal_cb", goal_cb, goal_cb_args, goal_cb_kwargs)
         on_result = self._user_callback("result_cb", result_cb, result_cb_args, result_cb_kwargs)
         self._use(
-            MessageSource("goal", empty_goal, goal, goal_key, goal_slots, on_goal),
+            MessageSource("goal", empty_goal, goal, key=goal_key, slots=goal_slots, callback=on_goal),
             MessageSink("result", empty_result, result_key, result_slots, on_result),
         )
         self._lock = threading.RLock()

@@ -77,7 +77,7 @@ def _tip_pairs(sampling: CollisionSampling, gripper: Gripper, position: float) -
 
 
 def ready_state(
-    sampling: CollisionSampling, arm: Arm, approach: Array, start: Array, disabled: Iterable[Pair], seed: int
+    sampling: CollisionSampling, arm: Arm, approach: Array, start: Array, *, disabled: Iterable[Pair], seed: int
 ) -> Array:
     """Returns collision-free joint positions with the arm's tip in front of the base and the approach axis down.
 

@@ -258,7 +258,7 @@ def _states(
         approach = (
             np.array([0.0, 0.0, 1.0]) if hand is None else approach_axis(model, hand, arm.tip, ends[hand.name][0])
         )
-        positions = ready_state(sampling, arm, approach, positions, disabled, seed)
+        positions = ready_state(sampling, arm, approach, positions, disabled=disabled, seed=seed)
         states[arm.name] = {"ready": _values(model, arm, positions)}
     return states
 

@@ -150,7 +150,7 @@ def _search(sampling: CollisionSampling, pair: Pair, random: np.random.Generator
     states = sampling.random_states(random, SEARCH_STATES)
     distances = [sampling.distance(pair, state) for state in states]
     for index in np.argsort(distances)[:SEARCH_STARTS]:
-        if _descend(sampling, pair, states[index], distances[index], joints, random):
+        if _descend(sampling, pair, states[index], distances[index], joints=joints, random=random):
             return True
     return False
 
@@ -160,6 +160,7 @@ def _descend(
     pair: Pair,
     state: Array,
     distance: float,
+    *,
     joints: Array,
     random: np.random.Generator,
 ) -> bool:
