@@ -121,7 +121,11 @@ def test_the_older_layout_has_the_objects_pose_in_its_shapes(tmp_path: Path) -> 
         "cup",
         (1.0, 2.0, 3.0),
         (0.0, 0.0, half, half),
-        (SceneShape("cylinder", (0.1, 0.4), (0.5, 0.0, 0.0), (half, 0.0, 0.0, half)),),
+        (
+            SceneShape(
+                kind="cylinder", size=(0.1, 0.4), position=(0.5, 0.0, 0.0), quaternion_xyzw=(half, 0.0, 0.0, half)
+            ),
+        ),
     )
     text = scene_text(Scene("old", (cup,)), old_layout=True)
     assert text.splitlines()[:5] == ["old", "* cup", "1", "cylinder", "0.1 0.4"], "radius before length"

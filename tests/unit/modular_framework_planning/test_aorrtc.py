@@ -42,7 +42,7 @@ def planned(planner_id: str, seed: int, repeatable: bool = True) -> PlanningAnsw
     scene = empty_scene(model).with_object(box)
     pipeline = PipelineSpec(settings=PipelineSettings(seed=seed)).build(model, KinematicsPool(model))
     goal = JointGoal({"x": 1.0, "y": 0.0})
-    request = PlanningRequest(scene, "tool", (goal,), planner_id, allowed_time_s=60.0 if repeatable else 2.0)
+    request = PlanningRequest(scene, "tool", (goal,), planner_id=planner_id, allowed_time_s=60.0 if repeatable else 2.0)
     return pipeline.plan(request, repeatable)
 
 

@@ -375,11 +375,11 @@ def test_pipelines_plan_with_the_checker_that_is_named(planner: str, detector: s
         scene.with_positions(start),
         "arm",
         (JointGoal({"pan": 0.3, "lift": 0.3, "bend": 0.2}),),
-        planner_id,
-        1,
-        60.0,
-        1.0,
-        1.0,
+        planner_id=planner_id,
+        attempts=1,
+        allowed_time_s=60.0,
+        velocity_scaling=1.0,
+        acceleration_scaling=1.0,
     )
     answer = pipeline.plan(request)
     judge = PlainCoalChecker(scene)
@@ -388,7 +388,9 @@ def test_pipelines_plan_with_the_checker_that_is_named(planner: str, detector: s
         for row in answer.trajectory.positions
     )
     assert type(pipeline.checker(scene, model.group("arm"), start)) is collision_detector(detector)
-    blocked = PlanningRequest(scene.with_positions(start), "arm", (JointGoal({"pan": 0.0, "lift": 1.6}),), planner_id)
+    blocked = PlanningRequest(
+        scene.with_positions(start), "arm", (JointGoal({"pan": 0.0, "lift": 1.6}),), planner_id=planner_id
+    )
     with pytest.raises(PlanningError, match="table"):
         pipeline.plan(blocked)
 

@@ -67,7 +67,7 @@ def test_compiled_verdicts_are_those_of_the_single_constraints(model: RobotModel
     number = int(rng.choice(indices))
     constraints = KinematicConstraints(
         model,
-        [JointConstraint("", number, float(rng.uniform(-2, 2)), 2.0, 3.0, bool(rng.integers(2)))]
+        [JointConstraint("", number, float(rng.uniform(-2, 2)), 2.0, 3.0, is_continuous=bool(rng.integers(2)))]
         * int(rng.integers(2)),
         [PositionConstraint(on_link(model), offset, moving, regions)] * int(rng.integers(2)),
         [

@@ -151,8 +151,8 @@ def test_a_position_is_kept_in_any_of_the_regions_of_a_turned_frame(model: Robot
 
 def test_a_joint_without_ends_is_compared_the_short_way_round() -> None:
     positions = np.array([3.1])
-    assert JointConstraint("turn", 0, -3.1, 0.2, 0.2, True).evaluate(None, positions).satisfied
-    assert not JointConstraint("turn", 0, -3.1, 0.2, 0.2, False).evaluate(None, positions).satisfied
+    assert JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=True).evaluate(None, positions).satisfied
+    assert not JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=False).evaluate(None, positions).satisfied
 
 
 def upright(model: RobotModel, kind: Parameterization, frame: FrameOnRobot) -> OrientationConstraint:

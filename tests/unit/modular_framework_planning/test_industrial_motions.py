@@ -65,7 +65,9 @@ def moved(pose: pin.SE3, shift: tuple[float, float, float], turn: tuple[float, f
 
 def lin(scene: PlanningScene, target: pin.SE3, **changes: object) -> PlanningRequest:
     return dataclasses.replace(
-        PlanningRequest(scene, GROUP, (PoseGoal(LINK, target),), "LIN", velocity_scaling=0.3, acceleration_scaling=0.3),
+        PlanningRequest(
+            scene, GROUP, (PoseGoal(LINK, target),), planner_id="LIN", velocity_scaling=0.3, acceleration_scaling=0.3
+        ),
         **changes,
     )
 
@@ -93,7 +95,7 @@ def test_ptp_moves_all_joints_in_the_phases_of_the_widest_move(
         scene,
         GROUP,
         (joint_goal(model, np.array(HOME) + change),),
-        "PTP",
+        planner_id="PTP",
         velocity_scaling=0.2,
         acceleration_scaling=0.1,
     )
@@ -126,7 +128,7 @@ def test_a_faster_joint_does_not_run_ahead_of_the_strictest_limit(robot: object)
     pipeline = PlanningPipeline(KinematicsPool(model), PipelineSettings(), CommandPlanner(None), adapters=())
     goal = JointGoal({"wrist_3_joint": 1.0})
     motion = pipeline.plan(
-        PlanningRequest(scene, GROUP, (goal,), "PTP", velocity_scaling=1.0, acceleration_scaling=1.0)
+        PlanningRequest(scene, GROUP, (goal,), planner_id="PTP", velocity_scaling=1.0, acceleration_scaling=1.0)
     ).trajectory
     assert motion.duration_s == pytest.approx(1.0 / 0.5 + 0.5 * (0.5 / 0.8 + 0.5 / 0.4) + ROUNDING_S, abs=1e-9)
     _, speed, change, _ = motion.sample(motion.sample_times())

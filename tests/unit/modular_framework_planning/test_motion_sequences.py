@@ -54,7 +54,12 @@ class Robot:
                 self.home.rotation @ pin.exp3(np.array(turn, dtype=float)), self.home.translation + np.array(position)
             )
             request = PlanningRequest(
-                scene, GROUP, (PoseGoal(LINK, target),), planner, velocity_scaling=pace, acceleration_scaling=pace
+                scene,
+                GROUP,
+                (PoseGoal(LINK, target),),
+                planner_id=planner,
+                velocity_scaling=pace,
+                acceleration_scaling=pace,
             )
             if planner == "CIRC":
                 here = self.follower.pose(scene.positions[self.model.group(GROUP).indices]).translation

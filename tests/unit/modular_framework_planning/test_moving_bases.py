@@ -77,7 +77,12 @@ def test_a_base_drives_round_a_wall_without_touching_it_and_stays_in_the_workspa
     model = robot(kind)
     scene = walled(model, kind)
     goal = THERE[kind] | ({"pan": 1.0, "elbow": 0.5} if group == "all" else {})
-    answer = plan(model, PlanningRequest(scene, group, (JointGoal(goal),), "", 1, 20.0, workspace=ROOM))
+    answer = plan(
+        model,
+        PlanningRequest(
+            scene, group, (JointGoal(goal),), planner_id="", attempts=1, allowed_time_s=20.0, workspace=ROOM
+        ),
+    )
     motion, names = answer.trajectory, answer.trajectory.joint_names
     for axis, name in enumerate(model.base.translations):
         way = motion.positions[:, names.index(name)]
@@ -118,7 +123,10 @@ def test_a_way_that_leaves_the_workspace_is_no_way() -> None:
     model = robot("planar")
     scene, goal = walled(model, "planar"), JointGoal(THERE["planar"])
     with pytest.raises(PlanningError) as caught:
-        plan(model, PlanningRequest(scene, "base", (goal,), "", 1, 1.0, workspace=NARROW))
+        plan(
+            model,
+            PlanningRequest(scene, "base", (goal,), planner_id="", attempts=1, allowed_time_s=1.0, workspace=NARROW),
+        )
     assert caught.value.code in (ErrorCode.TIMED_OUT, ErrorCode.PLANNING_FAILED)
 
 
@@ -153,7 +161,13 @@ def test_a_base_and_its_arm_together_reach_a_pose_within_the_workspace(kind: str
     base = shifted(1.2, -2.0, 0.0 if kind == "planar" else 0.3) @ turned("z", 1.0)
     target = base @ tool_in_cart(0.3, 0.9, -0.4)
     request = PlanningRequest(
-        walled(model, kind), "all", (PoseGoal("tool", pin.SE3(target)),), "", 1, 20.0, workspace=ROOM
+        walled(model, kind),
+        "all",
+        (PoseGoal("tool", pin.SE3(target)),),
+        planner_id="",
+        attempts=1,
+        allowed_time_s=20.0,
+        workspace=ROOM,
     )
     goal = plan(model, request).goal
     np.testing.assert_allclose(model.link_transforms(goal)["tool"].homogeneous, target, atol=1e-5)
@@ -208,7 +222,12 @@ def test_a_joint_without_ends_goes_the_long_way_round_where_the_short_one_is_blo
         scene = scene.with_object(CollisionObject(name, pose, ((Box(*size), pin.SE3.Identity()),)))
     reach = {"lift": 1.5, "elbow": 0.3}
     scene = scene.with_positions(model.merge(scene.positions, {"pan": 0.8, **reach}))
-    answer = plan(model, PlanningRequest(scene, "arm", (JointGoal({"pan": 2.4, **reach}),), "", 1, 4.0))
+    answer = plan(
+        model,
+        PlanningRequest(
+            scene, "arm", (JointGoal({"pan": 2.4, **reach}),), planner_id="", attempts=1, allowed_time_s=4.0
+        ),
+    )
     way = answer.trajectory.positions[:, answer.trajectory.joint_names.index("pan")]
     assert way[-1] == pytest.approx(2.4 - 2.0 * np.pi)
     checker = IndependentChecker(URDF, SRDF.format(kind="fixed"), str)

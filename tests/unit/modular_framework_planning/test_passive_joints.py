@@ -69,7 +69,7 @@ def planned(scene: PlanningScene, goals: tuple[object, ...]) -> np.ndarray:
     pipeline = PlanningPipeline(
         KinematicsPool(MODEL), PipelineSettings(seed=1), OmplPlanner(), adapters=make_adapters()
     )
-    answer = pipeline.plan(PlanningRequest(scene, "arm", goals, "RRTConnect", allowed_time_s=30.0))
+    answer = pipeline.plan(PlanningRequest(scene, "arm", goals, planner_id="RRTConnect", allowed_time_s=30.0))
     assert answer.trajectory.joint_names == tuple(AXES) and answer.goal[MODEL.index[SPRING]] == BENT[SPRING]
     return answer.goal
 

@@ -180,7 +180,7 @@ class Straight:
 def test_a_planner_of_ones_own_is_named_by_module_and_class(model: RobotModel, pool: KinematicsPool) -> None:
     own = make_planner(f"{Straight.__module__}/Straight", model, PipelineSettings())
     given = PlanningPipeline(pool, PipelineSettings(), own, adapters=make_adapters(), name="own")
-    free = PlanningRequest(empty_scene(model, place(model, START)), GROUP, goal(model), "whatever")
+    free = PlanningRequest(empty_scene(model, place(model, START)), GROUP, goal(model), planner_id="whatever")
     assert arrives(given.plan(free))
     error = failure(given, wall_request(model))
     assert error.code == ErrorCode.INVALID_MOTION_PLAN, "the validation does not trust it"

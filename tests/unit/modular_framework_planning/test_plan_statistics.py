@@ -131,7 +131,9 @@ def pipeline_request(model: RobotModel, goal: np.ndarray, time_s: float = 20.0) 
     scene, group = scene_with(model, WALL, COVER), model.group("all")
     start = model.merge(scene.positions, dict(zip(group.joints, START.tolist(), strict=True)))
     target = JointGoal(dict(zip(group.joints, goal.tolist(), strict=True)))
-    return PlanningRequest(scene.with_positions(start), "all", (target,), "RRTConnect", 1, time_s)
+    return PlanningRequest(
+        scene.with_positions(start), "all", (target,), planner_id="RRTConnect", attempts=1, allowed_time_s=time_s
+    )
 
 
 def test_a_plan_and_a_failed_one_say_what_they_took_also_to_another_process(small: RobotModel) -> None:

@@ -129,7 +129,14 @@ def test_random_plans_are_free_at_a_hundredth_rad_timed_within_limits_and_end_at
         for _ in range(10):
             goal = free_positions(model, scene, rng)
             request = PlanningRequest(
-                scene.with_positions(start), GROUP, (goal_at(model, goal),), "", 1, 10.0, 0.5, 0.5
+                scene.with_positions(start),
+                GROUP,
+                (goal_at(model, goal),),
+                planner_id="",
+                attempts=1,
+                allowed_time_s=10.0,
+                velocity_scaling=0.5,
+                acceleration_scaling=0.5,
             )
             answer = pipeline.plan(request)
             check_timing(model, answer, 0.5)
@@ -171,7 +178,16 @@ def test_an_answer_says_how_long_each_part_of_the_plan_took(model: RobotModel, p
 
 
 def test_scaling_makes_the_motion_slower_in_proportion(model: RobotModel, pipeline: PlanningPipeline) -> None:
-    request = PlanningRequest(table_scene(model), GROUP, (down(0.1, 0.5, 0.95),), "", 1, 5.0, 1.0, 1.0)
+    request = PlanningRequest(
+        table_scene(model),
+        GROUP,
+        (down(0.1, 0.5, 0.95),),
+        planner_id="",
+        attempts=1,
+        allowed_time_s=5.0,
+        velocity_scaling=1.0,
+        acceleration_scaling=1.0,
+    )
     full = pipeline.plan(request).trajectory.duration_s
     half = pipeline.plan(dataclasses.replace(request, velocity_scaling=0.5, acceleration_scaling=0.25))
     assert half.trajectory.duration_s - WINDOW_S == pytest.approx(2.0 * (full - WINDOW_S), rel=0.005), (

@@ -14,7 +14,7 @@ from modular_framework_planning.reproducible.request_seeds import RequestCounts,
 
 def request(start: float = 0.0, goal: float = 1.0, group: str = "arm", planner: str = "RRTConnect") -> PlanningRequest:
     scene: Any = SimpleNamespace(positions=np.array([start, 0.5]))
-    return PlanningRequest(scene, group, (JointGoal({"b": goal, "a": 0.25}),), planner)
+    return PlanningRequest(scene, group, (JointGoal({"b": goal, "a": 0.25}),), planner_id=planner)
 
 
 def test_equal_requests_have_equal_digests() -> None:

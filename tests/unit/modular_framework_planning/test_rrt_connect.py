@@ -80,7 +80,9 @@ def problem_in(
     target = JointGoal(dict(zip(group.joints, goal.tolist(), strict=True)))
     now_s = time.monotonic()
     return PlanningProblem(
-        request=PlanningRequest(scene, "all", (target,), "RRTConnect", 1, seconds, cancelled=cancelled),
+        request=PlanningRequest(
+            scene, "all", (target,), planner_id="RRTConnect", attempts=1, allowed_time_s=seconds, cancelled=cancelled
+        ),
         model=model,
         group=group,
         start=positions,

@@ -145,7 +145,12 @@ def test_seven_joints_end_a_line_at_joint_values_and_blend(seven: RobotModel) ->
     pipeline = PlanningPipeline(kinematics, settings, CommandPlanner(LIMITS), adapters=())
     scene = empty_scene(seven, BENT)
     first = PlanningRequest(
-        scene, "arm", (PoseGoal("flange", ahead((0.15, 0, 0))),), "LIN", velocity_scaling=0.2, acceleration_scaling=0.2
+        scene,
+        "arm",
+        (PoseGoal("flange", ahead((0.15, 0, 0))),),
+        planner_id="LIN",
+        velocity_scaling=0.2,
+        acceleration_scaling=0.2,
     )
     middle = pipeline.plan(first)
     wanted = middle.goal + np.array([0.1, 0.05, 0.1, -0.2, 0.0, 0.1, 0.0])

@@ -61,7 +61,9 @@ def request(model: RobotModel, values: tuple[float, ...] = GOAL, board: bool = T
             CollisionObject("board", pin.SE3(np.eye(3), BOARD_AT), ((Box(*THIN), pin.SE3.Identity()),))
         )
     goal = JointGoal(dict(zip(model.group(GROUP).joints, values, strict=True)))
-    return PlanningRequest(at_start(model, scene), GROUP, (goal,), "RRTConnect", 1, 60.0)
+    return PlanningRequest(
+        at_start(model, scene), GROUP, (goal,), planner_id="RRTConnect", attempts=1, allowed_time_s=60.0
+    )
 
 
 class Coarse(OmplPlanner):

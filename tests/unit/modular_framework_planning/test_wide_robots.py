@@ -92,7 +92,7 @@ def test_two_arms_move_at_the_same_time_and_do_not_touch_each_other() -> None:
     scene, goal = crossing()
     pillar, at = Box(0.06, 0.06, 1.2), np.array([0.65, 0.32, 0.8])  # in the way of the left arm
     scene = scene.with_object(CollisionObject("pillar", pin.SE3(np.eye(3), at), ((pillar, pin.SE3.Identity()),)))
-    motion = plan(PlanningRequest(scene, "arms", (goal,), "", 1, 20.0)).trajectory
+    motion = plan(PlanningRequest(scene, "arms", (goal,), planner_id="", attempts=1, allowed_time_s=20.0)).trajectory
     checker = IndependentChecker(URDF, SRDF, str)
     checker.set_world([("pillar", solid_box(0.06, 0.06, 1.2), shifted(*at))])
     rest = named(scene.positions)
@@ -138,7 +138,9 @@ def test_each_arm_of_a_group_gets_a_pose_of_its_own(group: str) -> None:
     targets = {side: tool(side, values) for side in SIDES}
     pairs = [pose_of(side, targets[side]) for side in SIDES]
     goal = ConstraintGoal(KinematicConstraints(robot(), (), [p for p, _ in pairs], [o for _, o in pairs]))
-    reached = named(plan(PlanningRequest(empty_scene(robot()), group, (goal,), "", 1, 20.0)).goal)
+    reached = named(
+        plan(PlanningRequest(empty_scene(robot()), group, (goal,), planner_id="", attempts=1, allowed_time_s=20.0)).goal
+    )
     for side in SIDES:
         found = tool(side, reached)
         np.testing.assert_allclose(found[:3, 3], targets[side][:3, 3], atol=2e-4)

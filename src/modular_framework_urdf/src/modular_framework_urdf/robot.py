@@ -171,7 +171,7 @@ class SafetyController:
     k_velocity: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Joint(UrdfElement):
     """A joint.
 

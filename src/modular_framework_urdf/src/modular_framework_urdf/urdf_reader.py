@@ -175,23 +175,23 @@ def _joint(element: Element, where: str) -> Joint:
 
     limit, safety, mimic = attributes_of("limit"), attributes_of("safety_controller"), attributes_of("mimic")
     return Joint(
-        name,
-        element.get("type", ""),
-        attributes_of("parent").text("link") or "",
-        attributes_of("child").text("link") or "",
-        _origin(element, f"joint '{name}'", where),
-        attributes_of("axis").vector("xyz", (1.0, 0.0, 0.0)),
-        None
+        name=name,
+        kind=element.get("type", ""),
+        parent=attributes_of("parent").text("link") or "",
+        child=attributes_of("child").text("link") or "",
+        origin=_origin(element, f"joint '{name}'", where),
+        axis=attributes_of("axis").vector("xyz", (1.0, 0.0, 0.0)),
+        limit=None
         if element.find("limit") is None
         else Limit(
             limit.number("lower", 0.0), limit.number("upper", 0.0), limit.optional("effort"), limit.optional("velocity")
         ),
-        None
+        safety=None
         if element.find("safety_controller") is None
         else SafetyController(
             *(safety.optional(key) for key in ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"))
         ),
-        None
+        mimic=None
         if element.find("mimic") is None
         else Mimic(mimic.text("joint") or "", mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)),
         line=element.sourceline,

@@ -42,17 +42,17 @@ class FakeLink:
     @property
     def state(self) -> ArmState:
         return ArmState(
-            time.monotonic(),
-            0.0,
-            tuple(self.positions),
-            self.velocities,
-            ZEROS,
-            ZEROS,
-            1.0,
-            1.0,
-            RUNNING,
-            NORMAL,
-            self.runtime_state,
+            received_s=time.monotonic(),
+            timestamp_s=0.0,
+            positions=tuple(self.positions),
+            velocities=self.velocities,
+            currents=ZEROS,
+            wrench=ZEROS,
+            speed_fraction=1.0,
+            speed_scaling=1.0,
+            robot_mode=RUNNING,
+            safety_mode=NORMAL,
+            runtime_state=self.runtime_state,
         )
 
     def servo(self, positions: Sequence[float], time_s: float) -> bool:
@@ -170,7 +170,17 @@ class FakeProcess:
         if self.role == "state":
             self._said = True
             yield ArmState(
-                time.monotonic(), 0.0, ZEROS, ZEROS, ZEROS, ZEROS, 1.0, 1.0, RUNNING, NORMAL, PLAYING
+                received_s=time.monotonic(),
+                timestamp_s=0.0,
+                positions=ZEROS,
+                velocities=ZEROS,
+                currents=ZEROS,
+                wrench=ZEROS,
+                speed_fraction=1.0,
+                speed_scaling=1.0,
+                robot_mode=RUNNING,
+                safety_mode=NORMAL,
+                runtime_state=PLAYING,
             ).packed()
         elif not self._said:
             self._said = True

@@ -16,7 +16,19 @@ from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.state_watch import ModeConfirmation, SilenceWatch, is_plausible
 
 SIX = (0.1,) * 6
-STATE = ArmState(100.0, 5.0, SIX, SIX, SIX, SIX, 1.0, 1.0, 7, 1, 2)
+STATE = ArmState(
+    received_s=100.0,
+    timestamp_s=5.0,
+    positions=SIX,
+    velocities=SIX,
+    currents=SIX,
+    wrench=SIX,
+    speed_fraction=1.0,
+    speed_scaling=1.0,
+    robot_mode=7,
+    safety_mode=1,
+    runtime_state=2,
+)
 
 
 def next_state(**changes: object) -> ArmState:

@@ -214,7 +214,14 @@ class GripperActionController(Controller):
         handle = self._handle
         error = self._command - handle.position
         return JointControlSnapshot(
-            time_s, period_s, self._command, handle.position, handle.velocity, error, handle.command, PidGains(0.0)
+            time_s=time_s,
+            period_s=period_s,
+            set_point=self._command,
+            process_value=handle.position,
+            process_value_dot=handle.velocity,
+            error=error,
+            command=handle.command,
+            gains=PidGains(0.0),
         )
 
     def _process(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:

@@ -25,7 +25,7 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 CYCLES_PER_REPORT = 10
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointControlSnapshot:
     """State of a PID controller of one joint in one cycle.
 
@@ -210,14 +210,14 @@ class GainsController(JointCommandController):
             value, rate = self._measured()
             self.on_state(
                 JointControlSnapshot(
-                    time_s,
-                    period_s,
-                    self._set_points[0],
-                    value,
-                    rate,
-                    self._error,
-                    self._handles[0].command,
-                    self._pids[0].gains,
+                    time_s=time_s,
+                    period_s=period_s,
+                    set_point=self._set_points[0],
+                    process_value=value,
+                    process_value_dot=rate,
+                    error=self._error,
+                    command=self._handles[0].command,
+                    gains=self._pids[0].gains,
                 )
             )
 

@@ -22,7 +22,7 @@ from modular_framework_control.mobile_base.wheel_geometry import WheelGeometry
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_names
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class WheelState:
     """State of one wheel in one cycle.
 
@@ -77,13 +77,13 @@ class _Wheel:
         rate = 1.0 / period_s if period_s > 0.0 else 0.0
         self._desired_position += handle.command * period_s
         state = WheelState(
-            handle.position,
-            handle.velocity,
-            (handle.velocity - self._velocity) * rate,
-            handle.effort,
-            self._desired_position,
-            handle.command,
-            (handle.command - self._desired_velocity) * rate,
+            position=handle.position,
+            velocity=handle.velocity,
+            acceleration=(handle.velocity - self._velocity) * rate,
+            effort=handle.effort,
+            desired_position=self._desired_position,
+            desired_velocity=handle.command,
+            desired_acceleration=(handle.command - self._desired_velocity) * rate,
         )
         self._velocity, self._desired_velocity = handle.velocity, handle.command
         return state

@@ -39,7 +39,7 @@ class BaseVelocity:
 AT_REST = BaseVelocity()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySnapshot:
     """Pose and velocity of the base.
 
@@ -205,7 +205,14 @@ class MobileBaseController(Controller, ABC):
             return False
         self.on_odometry(
             OdometrySnapshot(
-                time_s, pose.x, pose.y, pose.heading, pose.linear, pose.lateral, pose.angular, settings.enable_odom_tf
+                time_s=time_s,
+                x=pose.x,
+                y=pose.y,
+                heading=pose.heading,
+                linear=pose.linear,
+                lateral=pose.lateral,
+                angular=pose.angular,
+                with_tf=settings.enable_odom_tf,
             )
         )
         return True

@@ -19,7 +19,7 @@ NO_PROCESSOR_S = 1e-3
 _BUCKETS = 4000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LoopFigures:
     """Timing figures of a control loop since the last reset.
 
@@ -95,16 +95,16 @@ class LoopStatistics:
         """Returns the current figures."""
         mean_s = self._work_s / self._cycles if self._cycles else 0.0
         return LoopFigures(
-            self._cycles,
-            self._missed,
-            self._overruns,
-            self._percentile(0.5),
-            self._percentile(0.99),
-            self._late_max_s,
-            mean_s,
-            self._work_max_s,
-            self._no_processor_s,
-            self._no_processor_max_s,
+            cycles=self._cycles,
+            missed=self._missed,
+            overruns=self._overruns,
+            late_p50_s=self._percentile(0.5),
+            late_p99_s=self._percentile(0.99),
+            late_max_s=self._late_max_s,
+            work_mean_s=mean_s,
+            work_max_s=self._work_max_s,
+            no_processor_s=self._no_processor_s,
+            no_processor_max_s=self._no_processor_max_s,
         )
 
     def _percentile(self, fraction: float) -> float:

@@ -190,7 +190,7 @@ class Spline:
             )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
     """The motion of some joints of a controller: consecutive segments, then rest at the last position.
 
@@ -250,7 +250,13 @@ class Track:
             end_position: Final position, shape (joints,) [rad|m].
         """
         return cls(
-            list(joints), start_s, np.array([end_s - start_s]), coefficients, coefficients[:0], end_position, start_s
+            joints=list(joints),
+            start_s=start_s,
+            ends_s=np.array([end_s - start_s]),
+            first=coefficients,
+            others=coefficients[:0],
+            end_position=end_position,
+            origin_s=start_s,
         )
 
     def sample(self, time_s: float) -> Array:
@@ -307,7 +313,16 @@ def splice(
         target[POSITION] += offset
         bridge = segment_coefficients(state, target, origin_s + float(ends_s[0]) - splice_s, int(spline.orders[first]))
     end_position = spline.states[-1, POSITION] + offset
-    return Track(list(joints), splice_s, ends_s, bridge, spline.coefficients[first:], end_position, origin_s, offset)
+    return Track(
+        joints=list(joints),
+        start_s=splice_s,
+        ends_s=ends_s,
+        first=bridge,
+        others=spline.coefficients[first:],
+        end_position=end_position,
+        origin_s=origin_s,
+        offset=offset,
+    )
 
 
 def _whole_turns(position: Array, target: Array) -> Array:

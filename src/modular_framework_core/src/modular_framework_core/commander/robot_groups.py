@@ -18,7 +18,7 @@ class RobotModelError(ValueError):
     """A robot description is invalid or lacks the requested group or joint."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
     """A joint of the robot.
 
@@ -102,15 +102,15 @@ def _joint(joint: UrdfJoint) -> Joint:
     limit = joint.limit
     bounded = limit is not None and joint.kind != "continuous"
     return Joint(
-        joint.name,
-        joint.kind,
-        joint.parent,
-        joint.child,
-        limit.lower if limit is not None and bounded else -math.inf,
-        limit.upper if limit is not None and bounded else math.inf,
-        math.inf if limit is None or limit.effort is None else limit.effort,
-        joint.mimic.leader if joint.mimic is not None else "",
-        math.inf if limit is None or limit.velocity is None else limit.velocity,
+        name=joint.name,
+        kind=joint.kind,
+        parent=joint.parent,
+        child=joint.child,
+        lower=limit.lower if limit is not None and bounded else -math.inf,
+        upper=limit.upper if limit is not None and bounded else math.inf,
+        effort=math.inf if limit is None or limit.effort is None else limit.effort,
+        mimics=joint.mimic.leader if joint.mimic is not None else "",
+        velocity=math.inf if limit is None or limit.velocity is None else limit.velocity,
     )
 
 

@@ -33,7 +33,6 @@ class MessageKind:
         add_type: Service type that stores a message.
         get_type: Service type that returns a message.
         message_field: Field of the message in both types.
-        name_field: Field of the name in both requests.
         suffixes: Suffixes of the services ``add_<suffix>`` and ``get_<suffix>``; only the last suffix has
             ``remove_<suffix>``.
         plural: Suffix of the services for all messages, such as ``list_<plural>``.
@@ -43,9 +42,13 @@ class MessageKind:
     add_type: Any
     get_type: Any
     message_field: str
-    name_field: str
     suffixes: tuple[str, ...]
     plural: str
+
+    @property
+    def name_field(self) -> str:
+        """Field of the name in both requests."""
+        return f"{self.noun.replace(' ', '_')}_name"
 
     @property
     def message_type(self) -> Any:
@@ -58,7 +61,6 @@ JOINT_STATE = MessageKind(
     srv.AddJointState,
     srv.GetJointState,
     "joint_state",
-    "joint_state_name",
     ("joint_state",),
     "joint_states",
 )
@@ -67,20 +69,13 @@ TRAJECTORY = MessageKind(
     srv.AddJointTrajectory,
     srv.GetJointTrajectory,
     "joint_trajectory",
-    "trajectory_name",
     ("trajectory",),
     "trajectories",
 )
-POSE = MessageKind(
-    "pose", srv.AddPoseStamped, srv.GetPoseStamped, "pose_stamped", "pose_name", ("pose_stamped", "pose"), "poses"
-)
-ROBOT_POSE = MessageKind(
-    "robot pose", srv.AddRobotPose, srv.GetRobotPose, "robot_pose", "robot_pose_name", ("robot_pose",), "robot_poses"
-)
-PLAN = MessageKind("plan", srv.AddMoveitPlan, srv.GetMoveitPlan, "moveit_plan", "plan_name", ("plan",), "plans")
-GRASP = MessageKind(
-    "grasp", srv.AddStandardisedGrasp, srv.GetStandardisedGrasp, "grasp_message", "grasp_name", ("grasp",), "grasps"
-)
+POSE = MessageKind("pose", srv.AddPoseStamped, srv.GetPoseStamped, "pose_stamped", ("pose_stamped", "pose"), "poses")
+ROBOT_POSE = MessageKind("robot pose", srv.AddRobotPose, srv.GetRobotPose, "robot_pose", ("robot_pose",), "robot_poses")
+PLAN = MessageKind("plan", srv.AddMoveitPlan, srv.GetMoveitPlan, "moveit_plan", ("plan",), "plans")
+GRASP = MessageKind("grasp", srv.AddStandardisedGrasp, srv.GetStandardisedGrasp, "grasp_message", ("grasp",), "grasps")
 
 
 def complete_grasp_id(grasp: Any, name: str) -> None:

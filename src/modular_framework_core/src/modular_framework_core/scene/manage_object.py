@@ -18,7 +18,7 @@ class ObjectRequestError(ValueError):
     """A request to spawn or delete an object is invalid."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectRequest:
     """A request to spawn or delete an object.
 
@@ -69,13 +69,13 @@ def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
                 f"that is a folder of '{model_path or 'gazebo_model_path'}' with a {MODEL_FILE}"
             )
     return ObjectRequest(
-        delete,
-        name,
-        str(file) if file else options.type or name,
-        sdf_file,
-        _triplet("position", options.position),
-        _triplet("orientation", options.orientation),
-        options.reference,
+        delete=delete,
+        name=name,
+        object_type=str(file) if file else options.type or name,
+        sdf_file=sdf_file,
+        position_m=_triplet("position", options.position),
+        rpy_rad=_triplet("orientation", options.orientation),
+        reference_frame=options.reference,
     )
 
 
@@ -107,19 +107,27 @@ def request_to_spawn(
             f"there is no file '{file}'; the type must be a folder of '{model_path}' with a {MODEL_FILE}"
         )
     return ObjectRequest(
-        False,
-        name,
-        object_type,
-        file,
-        _triplet("position", position_m),
-        _triplet("orientation", rpy_rad),
-        reference_frame,
+        delete=False,
+        name=name,
+        object_type=object_type,
+        sdf_file=file,
+        position_m=_triplet("position", position_m),
+        rpy_rad=_triplet("orientation", rpy_rad),
+        reference_frame=reference_frame,
     )
 
 
 def request_to_delete(name: str) -> ObjectRequest:
     """Returns a request to delete an object."""
-    return ObjectRequest(True, name, name, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "world")
+    return ObjectRequest(
+        delete=True,
+        name=name,
+        object_type=name,
+        sdf_file=None,
+        position_m=(0.0, 0.0, 0.0),
+        rpy_rad=(0.0, 0.0, 0.0),
+        reference_frame="world",
+    )
 
 
 def _model_file(object_type: str, model_path: str) -> Path:

@@ -111,9 +111,9 @@ def _shapes(message: CollisionObject, color: Vector) -> tuple[SceneShape, ...]:
             "mesh",
             (),
             *_vectors(pose),
-            tuple((p.x, p.y, p.z) for p in mesh.vertices),
-            tuple(tuple(item.vertex_indices) for item in mesh.triangles),
-            color,
+            vertices=tuple((p.x, p.y, p.z) for p in mesh.vertices),
+            triangles=tuple(tuple(item.vertex_indices) for item in mesh.triangles),
+            color=color,
         )
         for mesh, pose in zip(message.meshes, message.mesh_poses, strict=True)
     ]

@@ -8,7 +8,7 @@ number of shapes; in the new layout, an object begins with its pose and ends wit
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 
 from modular_framework_urdf.rotations import multiply_quaternions, rotate_vector
@@ -42,6 +42,7 @@ class SceneShape:
     size: Vector
     position: Vector
     quaternion_xyzw: Vector
+    _: KW_ONLY
     vertices: tuple[Vector, ...] = ()
     triangles: tuple[tuple[int, ...], ...] = ()
     color: Vector = NO_COLOR
@@ -191,7 +192,7 @@ def _read_shape(lines: _Lines) -> SceneShape:
     color = lines.numbers(4, f"the colour of a {kind}")
     if not all(0.0 <= component <= 1.0 for component in color):
         raise lines.fault(f"the colour of a {kind}, red, green, blue and alpha in 0..1")
-    return SceneShape(kind, size, position, quaternion, vertices, triangles, color)
+    return SceneShape(kind, size, position, quaternion, vertices=vertices, triangles=triangles, color=color)
 
 
 def _triangle(lines: _Lines, vertex_count: int) -> tuple[int, ...]:

@@ -102,15 +102,15 @@ class StateBuilder:
         values: dict[str, Any] = {key: value.plain() for key, value in options.items()}
         return (
             StateSpec(
-                label,
-                source,
-                source.class_name,
-                values,
-                outcomes or (),
-                plain_transitions(body),
-                location,
-                plain_remapping(body),
-                options,
+                label=label,
+                source=source,
+                type=source.class_name,
+                options=values,
+                outcomes=outcomes or (),
+                transitions=plain_transitions(body),
+                location=location,
+                remapping=plain_remapping(body),
+                nodes=options,
             ),
             outcomes,
         )

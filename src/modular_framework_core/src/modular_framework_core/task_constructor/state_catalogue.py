@@ -42,7 +42,7 @@ class StateOption:
     uses: tuple[Use, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StateSource:
     """A state class and its source file.
 
@@ -166,17 +166,17 @@ def _read_state(name: str, file: Path) -> StateSource:
     ):
         options["io_keys"] = _default_io_keys(state)
     return StateSource(
-        name,
-        file,
-        class_name,
-        options,
-        takes_any,
-        is_framework_state,
-        state.doc,
-        missing_imports(module.tree, file),
-        reads_of(state.node),
-        file.read_text(encoding="utf-8"),
-        _own_keys(state),
+        name=name,
+        file=file,
+        class_name=class_name,
+        options=options,
+        takes_any_option=takes_any,
+        is_framework_state=is_framework_state,
+        doc=state.doc,
+        missing_imports=missing_imports(module.tree, file),
+        userdata=reads_of(state.node),
+        text=file.read_text(encoding="utf-8"),
+        own_keys=_own_keys(state),
     )
 
 

@@ -13,7 +13,7 @@ from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.template_catalogue import TemplateSource
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StateSpec:
     """A state of a task.
 

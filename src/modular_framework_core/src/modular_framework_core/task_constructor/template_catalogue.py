@@ -24,7 +24,7 @@ _OLD_NAME = re.compile(rf"\bstate_machine\.({'|'.join(_RENAMED)})\b")
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TemplateSource:
     """A template file.
 
@@ -86,14 +86,14 @@ def _read_template(name: str, file: Path) -> TemplateSource:
     concurrent, takes_keys = re.search(r"\bConcurrence\b", text), _TAKES_KEYS.search(text)
     doc = _DOC.search(text)
     return TemplateSource(
-        name,
-        file,
-        concurrent is not None,
-        options,
-        takes_keys is not None,
-        provided,
-        "" if doc is None else inspect.cleandoc(doc.group(1)),
-        _original_names(text, file),
+        name=name,
+        file=file,
+        concurrent=concurrent is not None,
+        options=options,
+        takes_keys=takes_keys is not None,
+        userdata=provided,
+        doc="" if doc is None else inspect.cleandoc(doc.group(1)),
+        fault=_original_names(text, file),
     )
 
 

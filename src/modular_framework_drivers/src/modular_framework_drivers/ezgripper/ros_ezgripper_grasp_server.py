@@ -146,7 +146,9 @@ class EzGripperManipulator:
 
 def gripper_group(joint: str) -> Group:
     """Returns the planning group of the gripper: one joint, with efforts as fractions of the full torque."""
-    knuckle = Joint(joint, "revolute", "", "", 0.0, CLOSED_POSITION, 1.0, "")
+    knuckle = Joint(
+        name=joint, kind="revolute", parent="", child="", lower=0.0, upper=CLOSED_POSITION, effort=1.0, mimics=""
+    )
     return Group("ezgripper", (knuckle,), "", {"closed": {joint: CLOSED_POSITION}})
 
 

@@ -21,7 +21,7 @@ MESSAGE_SIZE = 1024
 JointValues = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ArmState:
     """Holds a state reported by the arm's controller.
 
@@ -78,7 +78,21 @@ class ArmState:
     def unpacked(cls, message: bytes) -> ArmState:
         """Returns the state in a message."""
         values = _STATE.unpack(message)
-        return cls(values[1], values[2], values[3:9], values[9:15], values[15:21], values[21:27], *values[27:])
+        speed_fraction, speed_scaling, robot_mode, safety_mode, runtime_state, late_s = values[27:]
+        return cls(
+            received_s=values[1],
+            timestamp_s=values[2],
+            positions=values[3:9],
+            velocities=values[9:15],
+            currents=values[15:21],
+            wrench=values[21:27],
+            speed_fraction=speed_fraction,
+            speed_scaling=speed_scaling,
+            robot_mode=robot_mode,
+            safety_mode=safety_mode,
+            runtime_state=runtime_state,
+            late_s=late_s,
+        )
 
 
 def servo_message(positions: Sequence[float], time_s: float) -> bytes:

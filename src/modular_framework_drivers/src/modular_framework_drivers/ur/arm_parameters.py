@@ -38,7 +38,16 @@ def read_link_settings(parameters: ParameterReader) -> LinkSettings:
         "~servoj_gain",
         "~real_time",
     )
-    return LinkSettings(address, timeout_s, scale, mass_kg, tuple(centre_m), lookahead_s, gain, real_time)
+    return LinkSettings(
+        address,
+        timeout_s=timeout_s,
+        speed_scale=scale,
+        payload_kg=mass_kg,
+        payload_centre_m=tuple(centre_m),
+        lookahead_s=lookahead_s,
+        gain=gain,
+        real_time=real_time,
+    )
 
 
 def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJoint]:

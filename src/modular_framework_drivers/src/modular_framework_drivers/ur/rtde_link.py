@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 from modular_framework_drivers.ur.arm_messages import (
     ACCEPTED,
@@ -58,6 +58,7 @@ class LinkSettings:
     """
 
     address: str
+    _: KW_ONLY
     timeout_s: float = 0.12
     speed_scale: float | None = None
     payload_kg: float = 0.0

@@ -116,17 +116,17 @@ def read_new_state(arm: Any, now_s: float, last_timestamp_s: float) -> ArmState 
     if timestamp_s == last_timestamp_s:
         return None
     state = ArmState(
-        now_s,
-        timestamp_s,
-        tuple(arm.getActualQ()),
-        tuple(arm.getActualQd()),
-        tuple(arm.getActualCurrent()),
-        tuple(arm.getActualTCPForce()),
-        arm.getTargetSpeedFraction(),
-        arm.getSpeedScaling(),
-        arm.getRobotMode(),
-        arm.getSafetyMode(),
-        arm.getRuntimeState(),
+        received_s=now_s,
+        timestamp_s=timestamp_s,
+        positions=tuple(arm.getActualQ()),
+        velocities=tuple(arm.getActualQd()),
+        currents=tuple(arm.getActualCurrent()),
+        wrench=tuple(arm.getActualTCPForce()),
+        speed_fraction=arm.getTargetSpeedFraction(),
+        speed_scaling=arm.getSpeedScaling(),
+        robot_mode=arm.getRobotMode(),
+        safety_mode=arm.getSafetyMode(),
+        runtime_state=arm.getRuntimeState(),
     )
     return state if arm.getTimestamp() == timestamp_s else None
 

@@ -105,11 +105,11 @@ def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -
     cells = (FIELD_CELLS if len(kinds) else 0,) * 3
     per_cell = min(len(kinds), NEAREST_SOLIDS)
     return DistanceField(
-        kinds,
-        sizes,
-        poses,
-        np.array([-reach, -reach, -reach, 2.0 * reach / FIELD_CELLS]),
-        np.zeros(cells, dtype=bool),
-        np.empty((*cells, per_cell), dtype=np.int32),
-        np.empty((*cells, per_cell)),
+        kinds=kinds,
+        sizes=sizes,
+        poses=poses,
+        grid=np.array([-reach, -reach, -reach, 2.0 * reach / FIELD_CELLS]),
+        is_filled=np.zeros(cells, dtype=bool),
+        nearest=np.empty((*cells, per_cell), dtype=np.int32),
+        distances=np.empty((*cells, per_cell)),
     )

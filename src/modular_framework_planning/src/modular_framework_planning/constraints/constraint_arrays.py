@@ -67,20 +67,24 @@ def constraint_arrays(
     face_ends = np.cumsum([0, *(len(item) for item in faces)])
     no_region = np.zeros((len(orientations), 2))
     constraints = ConstraintArrays(
-        tree,
-        _matrix([(item.target, item.below, item.above) for item in joints], 3),
-        np.array([item.is_continuous for item in joints], dtype=bool),
-        np.array([POINT] * len(positions) + [_kind(item) for item in orientations], dtype=np.int64),
-        np.array([[rows_by_joint[frame.joint] for frame in pair] for pair in pairs], dtype=np.int64).reshape(-1, 2),
-        np.array([*map(_point_placements, positions), *map(_rotation_placements, orientations)]).reshape(-1, 2, 3, 4),
-        _matrix([[(n in link) - (n in other) for n in joint_ids] for link, other in supports], len(joint_ids)),
-        _matrix([*([(0.0,) * 3] * len(positions)), *(item.tolerances for item in orientations)], 3),
-        np.vstack([np.column_stack([ends[:-1], ends[1:]]), no_region]).astype(np.int64),
-        np.array([_shape(solid)[0] for solid, _ in solids], dtype=np.int64),
-        _matrix([_shape(solid)[1] for solid, _ in solids], 3),
-        np.array([pose.homogeneous[:3] for _, pose in solids]).reshape(-1, 3, 4),
-        np.column_stack([face_ends[:-1], face_ends[1:]]).astype(np.int64),
-        np.ascontiguousarray(np.vstack([np.empty((0, 4)), *faces])),
+        tree=tree,
+        ranges=_matrix([(item.target, item.below, item.above) for item in joints], 3),
+        is_continuous=np.array([item.is_continuous for item in joints], dtype=bool),
+        kinds=np.array([POINT] * len(positions) + [_kind(item) for item in orientations], dtype=np.int64),
+        frames=np.array([[rows_by_joint[frame.joint] for frame in pair] for pair in pairs], dtype=np.int64).reshape(
+            -1, 2
+        ),
+        placements=np.array([*map(_point_placements, positions), *map(_rotation_placements, orientations)]).reshape(
+            -1, 2, 3, 4
+        ),
+        signs=_matrix([[(n in link) - (n in other) for n in joint_ids] for link, other in supports], len(joint_ids)),
+        tolerances=_matrix([*([(0.0,) * 3] * len(positions)), *(item.tolerances for item in orientations)], 3),
+        regions=np.vstack([np.column_stack([ends[:-1], ends[1:]]), no_region]).astype(np.int64),
+        shapes=np.array([_shape(solid)[0] for solid, _ in solids], dtype=np.int64),
+        sizes=_matrix([_shape(solid)[1] for solid, _ in solids], 3),
+        poses=np.array([pose.homogeneous[:3] for _, pose in solids]).reshape(-1, 3, 4),
+        face_ranges=np.column_stack([face_ends[:-1], face_ends[1:]]).astype(np.int64),
+        faces=np.ascontiguousarray(np.vstack([np.empty((0, 4)), *faces])),
     )
     return constraints, np.array(
         [*(joint_id - 1 for joint_id in joint_ids), *(item.index for item in joints)], dtype=np.int64

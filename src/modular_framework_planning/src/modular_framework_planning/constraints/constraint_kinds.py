@@ -7,7 +7,7 @@ a tolerance about each axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from enum import Enum
 from typing import Any
 
@@ -76,6 +76,7 @@ class JointConstraint:
     target: float
     below: float
     above: float
+    _: KW_ONLY
     is_continuous: bool = False
     weight: float = 1.0
 

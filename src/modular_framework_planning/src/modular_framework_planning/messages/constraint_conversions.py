@@ -154,8 +154,8 @@ class _Reader:
             float(target),
             self._tolerance(where, "tolerance_below", message.tolerance_below),
             self._tolerance(where, "tolerance_above", message.tolerance_above),
-            model.is_continuous(index),
-            self._weight(where, message.weight),
+            is_continuous=model.is_continuous(index),
+            weight=self._weight(where, message.weight),
         )
 
     def _link(self, name: str, where: str) -> FrameOnRobot:

@@ -173,15 +173,15 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
     _require_quality(grasp.grasp_quality, f"{where}.grasp_quality")
     touch = list(goal.attached_object_touch_links) or [*hand.links, hand.link]
     return Manoeuvre(
-        grasp.id or where,
-        stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
-        translation(scene, grasp.pre_grasp_approach, hand.link, f"{where}.pre_grasp_approach"),
-        translation(scene, grasp.post_grasp_retreat, hand.link, f"{where}.post_grasp_retreat"),
-        _allowance(hand, goal.target_name, goal, grasp.allowed_touch_objects),
-        attaching(goal.target_name, hand.link, touch),
-        posture(grasp.pre_grasp_posture, hand, f"{where}.pre_grasp_posture"),
-        posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"),
-        goal.minimize_object_distance,
+        name=grasp.id or where,
+        tip_pose=stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
+        approach=translation(scene, grasp.pre_grasp_approach, hand.link, f"{where}.pre_grasp_approach"),
+        retreat=translation(scene, grasp.post_grasp_retreat, hand.link, f"{where}.post_grasp_retreat"),
+        allow=_allowance(hand, goal.target_name, goal, grasp.allowed_touch_objects),
+        effect=attaching(goal.target_name, hand.link, touch),
+        fingers_before=posture(grasp.pre_grasp_posture, hand, f"{where}.pre_grasp_posture"),
+        fingers_after=posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"),
+        closing_in=goal.minimize_object_distance,
     )
 
 
@@ -204,14 +204,14 @@ def place_manoeuvre(
     _require_quality(location.quality, f"{where}.quality")
     pose = stamped_in_scene(scene, location.place_pose, f"{where}.place_pose")
     return Manoeuvre(
-        location.id or where,
-        pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
-        translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
-        translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
-        _allowance(hand, held.name, goal, location.allowed_touch_objects),
-        lambda current: current.with_detached(held.name),
-        {},
-        posture(location.post_place_posture, hand, f"{where}.post_place_posture"),
+        name=location.id or where,
+        tip_pose=pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
+        approach=translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
+        retreat=translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
+        allow=_allowance(hand, held.name, goal, location.allowed_touch_objects),
+        effect=lambda current: current.with_detached(held.name),
+        fingers_before={},
+        fingers_after=posture(location.post_place_posture, hand, f"{where}.post_place_posture"),
         middle="release",
     )
 

@@ -18,7 +18,7 @@ from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeli
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MoveGroupContext:
     """Thread-safe parts of the node that all endpoints share."""
 

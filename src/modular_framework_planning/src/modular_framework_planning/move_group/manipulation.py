@@ -32,7 +32,7 @@ FINGER_SETTLE_S = 0.5
 MAX_REASONS = 10
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Task:
     """The differences between pickup and place.
 
@@ -203,9 +203,9 @@ class Manipulation:
             scene,
             group.name,
             (),
-            goal.planner_id,
-            1,
-            allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
+            planner_id=goal.planner_id,
+            attempts=1,
+            allowed_time_s=allowed_s if allowed_s > 0.0 else DEFAULT_PLANNING_TIME_S,
             cancelled=self._cancelled.is_set,
             path_constraints=None if constraints.is_empty else constraints,
         )

@@ -95,15 +95,15 @@ def build_context() -> MoveGroupContext:
         settings_below("plan_execution", PlanExecutionSettings), settings_below("pick_place", PickPlaceSettings)
     )
     return MoveGroupContext(
-        model,
-        monitor,
-        kinematics,
-        pipelines,
-        execution,
-        MarkerPublisher(model.planning_frame),
-        Reporter(publish_requests="--debug" in rospy.myargv()),
-        settings,
-        new_checker,
+        model=model,
+        monitor=monitor,
+        kinematics=kinematics,
+        pipelines=pipelines,
+        execution=execution,
+        markers=MarkerPublisher(model.planning_frame),
+        reporter=Reporter(publish_requests="--debug" in rospy.myargv()),
+        settings=settings,
+        new_checker=new_checker,
     )
 
 

@@ -80,7 +80,7 @@ class Translation:
         return pin.SE3(pose.rotation, pose.translation + step)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Manoeuvre:
     """A candidate grasp or release.
 

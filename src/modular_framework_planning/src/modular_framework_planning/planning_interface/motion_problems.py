@@ -100,7 +100,15 @@ def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowe
     )
     name = f"{scene_path.parent.name}/{request_path.stem.removeprefix('request')}"
     return MotionProblem(
-        name, PlanningRequest(scene, request["group_name"], goals, request.get("planner_id", ""), 1, allowed_time_s)
+        name,
+        PlanningRequest(
+            scene,
+            request["group_name"],
+            goals,
+            planner_id=request.get("planner_id", ""),
+            attempts=1,
+            allowed_time_s=allowed_time_s,
+        ),
     )
 
 

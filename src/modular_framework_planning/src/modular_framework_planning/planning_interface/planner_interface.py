@@ -54,7 +54,7 @@ class SolutionValidator(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanningProblem:
     """A planning request prepared for a planner; belongs to one thread.
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -214,6 +214,7 @@ class PlanningRequest:
     scene: PlanningScene
     group: str
     goals: tuple[JointGoal | PoseGoal | ConstraintGoal, ...]
+    _: KW_ONLY
     planner_id: str = ""
     attempts: int = 1
     allowed_time_s: float = 5.0
@@ -231,7 +232,7 @@ class PlanningRequest:
     auxiliary_point: AuxiliaryPoint | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanningAnswer:
     """A validated motion.
 

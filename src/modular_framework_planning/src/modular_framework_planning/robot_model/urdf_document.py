@@ -29,7 +29,7 @@ PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
 CONTINUOUS_BOUND = 1.0e6  # bound that stands for the missing bounds of a continuous joint [rad]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfDocument:
     """A URDF prepared for Pinocchio.
 
@@ -225,18 +225,18 @@ def load_urdf(
     variables = base.chain() if base else ()
     joints = (*variables, *robot.joints)
     return UrdfDocument(
-        _xml_for_pinocchio(text, variables),
-        robot.name,
-        roots[0],
-        links,
-        {joint.name: joint.parent for joint in joints},
-        {joint.name: joint.child for joint in joints},
-        {joint.name: joint.kind for joint in joints},
-        mimics,
-        {link.name: tuple(_visual_meshes(link)) for link in robot.links},
-        {link.name: tuple(_visual_shapes(link)) for link in robot.links},
-        {link.name: tuple(_collisions(link, resolve)) for link in robot.links},
-        (*notes, *ignored),
-        base,
-        {joint.name: described_limits(joint) for joint in robot.movable_joints()},
+        xml=_xml_for_pinocchio(text, variables),
+        robot_name=robot.name,
+        root_link=roots[0],
+        links=links,
+        joint_parents={joint.name: joint.parent for joint in joints},
+        joint_children={joint.name: joint.child for joint in joints},
+        joint_kinds={joint.name: joint.kind for joint in joints},
+        mimics=mimics,
+        visual_meshes={link.name: tuple(_visual_meshes(link)) for link in robot.links},
+        visual_shapes={link.name: tuple(_visual_shapes(link)) for link in robot.links},
+        collisions={link.name: tuple(_collisions(link, resolve)) for link in robot.links},
+        notes=(*notes, *ignored),
+        multi_dof_joint=base,
+        limits={joint.name: described_limits(joint) for joint in robot.movable_joints()},
     )

@@ -63,8 +63,8 @@ def _create(args: argparse.Namespace) -> int:
     check_sampling(args)
     interactive = not args.yes and sys.stdin.isatty()
     choices = Choices(
-        _name(args, interactive), [tuple(chain) for chain in args.arm], args.gripper, args.samples, args.seed,
-        args.author, args.email,
+        name=_name(args, interactive), chains=[tuple(chain) for chain in args.arm], fingers=args.gripper,
+        samples=args.samples, seed=args.seed, author=args.author, email=args.email,
     )  # fmt: skip
     refuse_existing(args.into, (choices.robot_package, choices.config_package))
     source = read_source(args.urdf, _mappings(args.arguments), choices.robot_package)

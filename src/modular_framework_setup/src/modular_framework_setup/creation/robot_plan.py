@@ -40,7 +40,7 @@ ConfirmParts = Callable[[RobotTree, RobotParts], RobotParts]
 """Function that lets the user confirm or correct the parts that were found."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Choices:
     """Options of the user.
 
@@ -84,7 +84,7 @@ class MovedJoint:
     acceleration: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotPlan:
     """Content of a robot's packages.
 
@@ -141,18 +141,18 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
     verdicts = find_verdicts(model, _hands(model, parts, ends), choices.samples, choices.seed, progress)
     disabled = [verdict.pair for verdict in verdicts if verdict.reason]
     return RobotPlan(
-        choices,
-        xml_text.to_text(source.root),
-        source.copies,
-        tree.roots[0],
-        parts,
-        _states(model, parts, ends, disabled, choices.seed),
-        verdicts,
-        {name: _moved_joint(model, name) for name in _controlled_joints(parts)},
-        {arm.name: _segment_fraction(model, arm.joints) for arm in parts.arms},
-        _palm_parents(tree, parts),
-        source.path.name,
-        notes,
+        choices=choices,
+        urdf=xml_text.to_text(source.root),
+        copies=source.copies,
+        root=tree.roots[0],
+        parts=parts,
+        states=_states(model, parts, ends, disabled, choices.seed),
+        verdicts=verdicts,
+        joints={name: _moved_joint(model, name) for name in _controlled_joints(parts)},
+        segment_fractions={arm.name: _segment_fraction(model, arm.joints) for arm in parts.arms},
+        palm_parents=_palm_parents(tree, parts),
+        urdf_file=source.path.name,
+        notes=notes,
     )
 
 

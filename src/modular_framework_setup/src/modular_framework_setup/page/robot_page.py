@@ -38,7 +38,7 @@ class Mark:
     percent: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointRow:
     """A movable joint, with its range on a scale common to all joints of its kind.
 
@@ -229,22 +229,22 @@ def _joint_row(
     tight_low, tight_high = _number(limits, *entry, "min_position"), _number(limits, *entry, "max_position")
     tight = (max(low, low if tight_low is None else tight_low), min(high, high if tight_high is None else tight_high))
     return JointRow(
-        joint.name,
-        joint.kind,
-        "m" if joint.kind == "prismatic" else "rad",
-        low if is_limited else None,
-        high if is_limited else None,
-        percent(low),
-        round(percent(high) - percent(low), 2),
-        percent(0.0),
-        (percent(tight[0]), round(percent(tight[1]) - percent(tight[0]), 2)) if tight != (low, high) else None,
-        joint.limit.velocity if joint.limit else None,
-        _number(limits, *entry, "max_velocity"),
-        _number(limits, *entry, "max_acceleration"),
-        joint.limit.effort if joint.limit else None,
-        f"{joint.mimic.multiplier:g} × {joint.mimic.leader} + {joint.mimic.offset:g}" if joint.mimic else "",
-        tuple(name for name, group in semantics.groups.items() if joint.name in group.active),
-        tuple(
+        name=joint.name,
+        kind=joint.kind,
+        unit="m" if joint.kind == "prismatic" else "rad",
+        lower=low if is_limited else None,
+        upper=high if is_limited else None,
+        left=percent(low),
+        width=round(percent(high) - percent(low), 2),
+        zero=percent(0.0),
+        tight=(percent(tight[0]), round(percent(tight[1]) - percent(tight[0]), 2)) if tight != (low, high) else None,
+        velocity=joint.limit.velocity if joint.limit else None,
+        velocity_in_file=_number(limits, *entry, "max_velocity"),
+        acceleration=_number(limits, *entry, "max_acceleration"),
+        effort=joint.limit.effort if joint.limit else None,
+        follows=f"{joint.mimic.multiplier:g} × {joint.mimic.leader} + {joint.mimic.offset:g}" if joint.mimic else "",
+        groups=tuple(name for name, group in semantics.groups.items() if joint.name in group.active),
+        marks=tuple(
             Mark(f"{group} {name}", positions[joint.name], percent(positions[joint.name]))
             for group, named in states.items()
             for name, positions in named.items()

@@ -38,7 +38,7 @@ from modular_framework_planning.trajectory_processing.link_speed import MovedFra
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Lines:
     """A parsed request; `offset` is the pose of `follower`, which follows the lines, in the frame of `link`."""
 
@@ -113,7 +113,17 @@ class CartesianPathService(ServiceCapability):
             checker = self._context.pipeline("").checker(scene, group, scene.positions)
         motion_checker = checker or self._context.new_checker(scene, group.indices)
         motion = MotionChecker(motion_checker, group.indices, scene.positions)
-        return _Lines(scene, group, solver, name, link, offset, _waypoints(scene, name, request), motion, checker)
+        return _Lines(
+            scene=scene,
+            group=group,
+            solver=solver,
+            follower=name,
+            link=link,
+            offset=offset,
+            waypoints=_waypoints(scene, name, request),
+            motion=motion,
+            checker=checker,
+        )
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
         """Returns a check of a step that finds violated path constraints, then collisions."""

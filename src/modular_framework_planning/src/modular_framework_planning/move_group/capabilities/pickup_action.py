@@ -29,7 +29,14 @@ class PickupAction(ManipulationAction):
 
         order = best_first(grasp.grasp_quality for grasp in goal.possible_grasps)
         return Task(
-            "pickup", goal, goal.group_name, goal.end_effector, lambda scene: _check(scene, goal), order, read, accept
+            kind="pickup",
+            goal=goal,
+            group=goal.group_name,
+            end_effector=goal.end_effector,
+            check=lambda scene: _check(scene, goal),
+            candidates=order,
+            read=read,
+            accept=accept,
         )
 
 

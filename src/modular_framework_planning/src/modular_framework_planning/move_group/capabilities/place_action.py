@@ -31,7 +31,16 @@ class PlaceAction(ManipulationAction):
             result.place_location = goal.place_locations[index]
 
         order = best_first(location.quality for location in goal.place_locations)
-        return Task("place", goal, goal.group_name, "", lambda scene: _check(scene, goal), order, read, accept)
+        return Task(
+            kind="place",
+            goal=goal,
+            group=goal.group_name,
+            end_effector="",
+            check=lambda scene: _check(scene, goal),
+            candidates=order,
+            read=read,
+            accept=accept,
+        )
 
 
 def _check(scene: PlanningScene, goal: PlaceGoal) -> None:

@@ -53,7 +53,7 @@ class LinePath:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ArcPath:
     """A circular arc between two poses.
 
@@ -133,14 +133,14 @@ def arc_around_centre(start: Transform, end: Transform, centre: Array) -> ArcPat
     perpendicular = end_offset - (end_offset @ first) * first
     angle = float(np.arctan2(np.linalg.norm(perpendicular), end_offset @ first))
     return ArcPath(
-        start,
-        pin.log3(start.rotation.T @ end.rotation),
-        centre,
-        first,
-        perpendicular / np.linalg.norm(perpendicular),
-        angle,
-        start_radius,
-        end_radius,
+        start=start,
+        rotation_vector=pin.log3(start.rotation.T @ end.rotation),
+        centre=centre,
+        first=first,
+        second=perpendicular / np.linalg.norm(perpendicular),
+        angle=angle,
+        start_radius=start_radius,
+        end_radius=end_radius,
     )
 
 
@@ -173,7 +173,16 @@ def arc_through_interim(start: Transform, end: Transform, interim: Array) -> Arc
     second = np.cross(normal / np.sqrt(squared_norm), first)
     end_offset = end.translation - centre
     angle = float(np.arctan2(end_offset @ second, end_offset @ first)) % (2.0 * np.pi)
-    return ArcPath(start, pin.log3(start.rotation.T @ end.rotation), centre, first, second, angle, radius, radius)
+    return ArcPath(
+        start=start,
+        rotation_vector=pin.log3(start.rotation.T @ end.rotation),
+        centre=centre,
+        first=first,
+        second=second,
+        angle=angle,
+        start_radius=radius,
+        end_radius=radius,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

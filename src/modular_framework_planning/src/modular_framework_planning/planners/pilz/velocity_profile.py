@@ -20,7 +20,7 @@ MAX_POINTS = 20_000  # maximum number of points of a motion
 MIN_GAP_S = 1.0e-4  # minimum time between two points of a trajectory
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrapezoidalProfile:
     """Position along a path over time, from rest to rest.
 
@@ -83,7 +83,14 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
     scale = distance / positions[-1]
     velocities[-1] = 0.0
     return TrapezoidalProfile(
-        distance, rise, cruise, fall, knots, positions * scale, velocities * scale, accelerations * scale
+        distance=distance,
+        rise_s=rise,
+        cruise_s=cruise,
+        fall_s=fall,
+        knots=knots,
+        positions=positions * scale,
+        velocities=velocities * scale,
+        accelerations=accelerations * scale,
     )
 
 
