@@ -218,9 +218,23 @@ def _groups(model: RobotModel, pairs: WatchedPairs) -> Grouping:
     return tuple(tuple(group) for group in groups.values())
 
 
+class LinkGroups(NamedTuple):
+    """Groups of links.
+
+    Attributes:
+        surfaces: Surfaces of the groups.
+        bodies: A body for each group.
+        body_of_link: Body index of each link, -1 for none.
+    """
+
+    surfaces: Surfaces
+    bodies: BodyArrays
+    body_of_link: NDArray[np.int64]
+
+
 @lru_cache(maxsize=GROUPING_CACHE_SIZE)
-def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArrays, NDArray[np.int64]]:
-    """Returns the surfaces of groups of links, a body for each group, and the body index of each link, -1 for none."""
+def link_groups(model: RobotModel, groups: Grouping) -> LinkGroups:
+    """Returns the surfaces and bodies of groups of links."""
     surfaces, roots = _link_surfaces(model, groups)
     links, shapes, body_of_link = _link_bounding_geometries(model), [], np.full(len(model.link_geometries), -1)
     for body, group in enumerate(groups):
@@ -229,7 +243,7 @@ def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArra
     joints = [model.link_geometries[group[0]].joint_id - 1 for group in groups]
     arrays = _body_arrays(shapes, joints, is_environment=False)
     _set_surfaces(arrays, np.ones(len(groups), dtype=bool), surfaces, roots)
-    return surfaces, arrays, body_of_link
+    return LinkGroups(surfaces, arrays, body_of_link)
 
 
 def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_environment: bool) -> BodyArrays:

@@ -204,7 +204,7 @@ def _table_keys(
     model: RobotModel, groups: Grouping, both: NDArray[np.int64], margins: Array
 ) -> dict[int, tuple[int, ...]]:
     """Returns the table keys of pairs of link groups, by pair index; pairs without a table are left out."""
-    _, bodies, _ = link_groups(model, groups)
+    bodies = link_groups(model, groups).bodies
     keys = {}
     for index in np.flatnonzero((both < len(groups)).all(axis=1) & (margins == 0.0)).tolist():
         key = _table_key(whole_tree(model), bodies, *both[index].tolist())

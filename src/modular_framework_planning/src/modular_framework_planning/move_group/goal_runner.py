@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import rospy
 
@@ -22,6 +22,20 @@ def error_code_of(result: Any) -> Any:
     return getattr(result, "response", result).error_code
 
 
+class GoalEnd(NamedTuple):
+    """The end of a goal.
+
+    Attributes:
+        result: Result message.
+        succeeded: Whether the goal succeeded.
+        text: Text for the client.
+    """
+
+    result: Any
+    succeeded: bool
+    text: str
+
+
 class GoalRunner:
     """Runs goals; a new goal cancels earlier goals that share a resource with it and starts when they have ended."""
 
@@ -29,7 +43,7 @@ class GoalRunner:
         self,
         name: str,
         kind: Any,
-        execute: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]],
+        execute: Callable[[Any, threading.Event, Callable[[Any], None]], GoalEnd],
         resources: Callable[[Any], frozenset[str] | None] = lambda goal: None,
     ) -> None:
         """Creates the server without starting it.
@@ -38,7 +52,6 @@ class GoalRunner:
             name: Name of the action.
             kind: Action type.
             execute: Called with the goal, an event that is set on cancellation, and a function that publishes feedback.
-                Returns the result, whether the goal succeeded, and a text.
             resources: Returns the names of the resources that a goal uses; None for all resources.
         """
         self._execute, self._resources = execute, resources

@@ -130,7 +130,7 @@ def _integrals(trajectory: Trajectory, times: Array) -> Array:
     segment = np.clip(np.searchsorted(trajectory.times, clipped, side="right") - 1, 0, len(spans) - 1)
     offsets = (clipped - trajectory.times[segment])[:, None]
     area = areas[segment] + np.einsum("npj,np->nj", coefficients[segment], offsets**powers)
-    return area + (times - clipped)[:, None] * trajectory.sample(clipped)[0]
+    return area + (times - clipped)[:, None] * trajectory.sample(clipped).positions
 
 
 def averaged_curve(trajectory: Trajectory, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
@@ -147,7 +147,7 @@ def averaged_curve(trajectory: Trajectory, velocity: Array, acceleration: Array,
     """
     if len(trajectory.times) < 2:
         return trajectory
-    max_acceleration = np.abs(trajectory.sample(trajectory.sample_times())[2]).max(axis=0)
+    max_acceleration = np.abs(trajectory.sample(trajectory.sample_times()).accelerations).max(axis=0)
     window = float((2.0 * max_acceleration / jerk).max())
     deviation = float(max_acceleration.max()) * window * window / 24.0
     factor = max(1.0, (deviation / MAX_DEVIATION) ** (1.0 / 6.0))

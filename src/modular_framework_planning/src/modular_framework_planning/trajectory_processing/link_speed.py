@@ -49,11 +49,11 @@ def frame_speeds(moved: MovedFrame, trajectory: Trajectory, times: Array) -> Arr
         times: Sample times, shape (m,) [s].
     """
     model = moved.model
-    positions, velocities, _, _ = trajectory.sample(times)
+    curve = trajectory.sample(times)
     indices = [model.index[name] for name in trajectory.joint_names]
     data, frame = model.pin_model.createData(), moved.frame
     result = np.empty(len(times))
-    for index, (values, rates) in enumerate(zip(positions, velocities, strict=True)):
+    for index, (values, rates) in enumerate(zip(curve.positions, curve.velocities, strict=True)):
         all_rates = np.zeros(len(model.joint_names))
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,15 @@ from modular_framework_planning.trajectory_processing.compiled_curves import (
 
 SAMPLE_PERIOD_S = 0.001  # typical period of a controller
 STRAIGHT_TOLERANCE = 1.0e-5  # maximum distance of a straight curve from its chord [rad or m]
+
+
+class CurveValues(NamedTuple):
+    """Values of a curve at m times, each of shape (m, joints)."""
+
+    positions: Array
+    velocities: Array
+    accelerations: Array
+    jerks: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +61,12 @@ class Trajectory:
         rows = (self.times, self.positions, self.velocities, self.accelerations)
         return quintic_coefficients(*(np.ascontiguousarray(item, dtype=float) for item in rows))
 
-    def sample(self, times: Array) -> tuple[Array, Array, Array, Array]:
-        """Returns positions, velocities, accelerations and jerks of the curve at times [s], shape (m, joints) each."""
+    def sample(self, times: Array) -> CurveValues:
+        """Returns the values of the curve at times [s]."""
         if len(self.times) < 2:
             still = np.zeros((len(times), self.positions.shape[1]))
-            return still + self.positions[0], still, still, still
-        positions, velocities, accelerations, jerks = self._values(times, 4)
-        return positions, velocities, accelerations, jerks
+            return CurveValues(still + self.positions[0], still, still, still)
+        return CurveValues(*self._values(times, 4))
 
     def positions_at(self, times: Array) -> Array:
         """Returns positions of the curve at times [s], shape (m, joints); needs at least two points."""

@@ -12,7 +12,7 @@ import rospy
 
 from modular_framework_planning.errors import ErrorCode
 from modular_framework_planning.move_group.context import MoveGroupContext
-from modular_framework_planning.move_group.goal_runner import GoalRunner, error_code_of
+from modular_framework_planning.move_group.goal_runner import GoalEnd, GoalRunner, error_code_of
 
 PublishState = Callable[[str], None]
 
@@ -58,10 +58,10 @@ class ActionCapability(MoveGroupCapability):
         self._runner = GoalRunner(self.name, self.kind, self._execute, self._resources)
         self._runner.connect()
 
-    def _execute(self, goal: Any, cancelled: Event, feedback: Callable[[Any], None]) -> tuple[Any, bool, str]:
+    def _execute(self, goal: Any, cancelled: Event, feedback: Callable[[Any], None]) -> GoalEnd:
         feedback_type = type(self.kind().action_feedback.feedback)
         result, text = self._perform(goal, cancelled, lambda state: feedback(feedback_type(state)))
-        return result, error_code_of(result).val == ErrorCode.SUCCESS, text
+        return GoalEnd(result, error_code_of(result).val == ErrorCode.SUCCESS, text)
 
     def _resources(self, goal: Any) -> frozenset[str] | None:
         """Returns the joints that a goal moves; None for all joints, so that every new goal cancels this goal."""

@@ -204,7 +204,7 @@ class TimedPath:
 
     def pose(self, time_s: float) -> Transform:
         """Returns the link pose in the planning frame."""
-        position = self.profile.sample(np.array([time_s]))[0][0]
+        position = self.profile.sample(np.array([time_s])).position[0]
         return self.path.pose(float(position) / self.profile.distance)
 
 

@@ -9,6 +9,7 @@ limits. Its position is a cubic spline, which a controller follows exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,14 @@ from modular_framework_planning.geometry.spatial import Array
 ROUNDING_S = 0.004  # width of the averaging window, which is the duration of a change of acceleration
 MAX_POINTS = 20_000  # maximum number of points of a motion
 MIN_GAP_S = 1.0e-4  # minimum time between two points of a trajectory
+
+
+class ProfileValues(NamedTuple):
+    """Values of a profile at m times, each of shape (m,)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,14 +54,14 @@ class TrapezoidalProfile:
         """Duration of the trapezoid and the rounding [s]."""
         return float(self.knots[-1])
 
-    def sample(self, times: Array) -> tuple[Array, Array, Array]:
-        """Returns position, velocity and acceleration at times [s]; times outside the profile are clipped."""
+    def sample(self, times: Array) -> ProfileValues:
+        """Returns the values at times [s]; times outside the profile are clipped."""
         clipped = np.clip(times, 0.0, self.duration_s)
         piece = np.clip(np.searchsorted(self.knots, clipped, side="right") - 1, 0, len(self.knots) - 2)
         jerk = np.diff(self.accelerations)[piece] / np.diff(self.knots)[piece]
         t, v, a = clipped - self.knots[piece], self.velocities[piece], self.accelerations[piece]
         position = self.positions[piece] + t * (v + t * (0.5 * a + t * jerk / 6.0))
-        return position, v + t * (a + 0.5 * t * jerk), a + t * jerk
+        return ProfileValues(position, v + t * (a + 0.5 * t * jerk), a + t * jerk)
 
 
 def fastest_profile(distance: float, velocity: float, acceleration: float, deceleration: float) -> TrapezoidalProfile:
