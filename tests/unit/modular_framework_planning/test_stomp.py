@@ -100,7 +100,18 @@ def test_time_and_cancelling_end_the_search(model: RobotModel) -> None:
 
 
 def test_parameters_of_both_moveits_are_read_and_checked() -> None:
-    assert read_settings({}) == StompSettings(60, 40, 0, 30, 30, 0.8, 0.1, 0.1, 0.3, 4)
+    assert read_settings({}) == StompSettings(
+        num_timesteps=60,
+        num_iterations=40,
+        num_iterations_after_valid=0,
+        num_rollouts=30,
+        max_rollouts=30,
+        exponentiated_cost_sensitivity=0.8,
+        control_cost_weight=0.1,
+        delta_t=0.1,
+        stddev=0.3,
+        num_attempts=4,
+    )
     assert read_settings({"stomp_moveit": {"num_timesteps": 30}}).num_timesteps == 30
     assert read_settings({"stomp": {"arm": {"optimization": {"num_rollouts": 7}}}}, "arm").num_rollouts == 7
     with pytest.raises(

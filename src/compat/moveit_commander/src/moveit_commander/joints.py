@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any
 
 from modular_framework_urdf import robot as urdf_robot
@@ -32,6 +32,7 @@ class Joint:
     kind: str
     parent: str
     child: str
+    _: KW_ONLY
     lower: float = 0.0
     upper: float = 0.0
     velocity: float = 1.0
@@ -100,8 +101,8 @@ def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
         "continuous" if variable == "theta" else "prismatic",
         joint.parent_frame,
         joint.child_link,
-        -bound,
-        bound,
+        lower=-bound,
+        upper=bound,
         neutral=1.0 if variable == QUATERNION_W else 0.0,
     )
     joint_limits = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
@@ -139,14 +140,14 @@ def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
         joint.kind,
         joint.parent,
         joint.child,
-        lower,
-        upper,
-        limits.velocity,
-        limits.acceleration,
-        joint.origin.xyz,
-        joint.origin.rpy,
-        joint.axis,
-        mimic.leader,
-        mimic.multiplier,
-        mimic.offset,
+        lower=lower,
+        upper=upper,
+        velocity=limits.velocity,
+        acceleration=limits.acceleration,
+        xyz=joint.origin.xyz,
+        rpy=joint.origin.rpy,
+        axis=joint.axis,
+        leader=mimic.leader,
+        multiplier=mimic.multiplier,
+        offset=mimic.offset,
     )

@@ -130,13 +130,13 @@ def controller_statistics_to_msg(report: ControllerReport, ahead_s: float = 0.0)
         for time_s in (figures.updated_at_s, figures.last_overrun_s)
     )
     return ControllerStatistics(
-        report.info.name,
-        report.info.type,
-        updated,
-        report.state is LoadedState.RUNNING,
-        genpy.Duration.from_sec(figures.max_s),
-        genpy.Duration.from_sec(figures.mean_s),
-        genpy.Duration.from_sec(math.sqrt(figures.variance_s2)),
-        figures.overruns,
-        overrun,
+        name=report.info.name,
+        type=report.info.type,
+        timestamp=updated,
+        running=report.state is LoadedState.RUNNING,
+        max_time=genpy.Duration.from_sec(figures.max_s),
+        mean_time=genpy.Duration.from_sec(figures.mean_s),
+        variance_time=genpy.Duration.from_sec(math.sqrt(figures.variance_s2)),
+        num_control_loop_overruns=figures.overruns,
+        time_last_control_loop_overrun=overrun,
     )

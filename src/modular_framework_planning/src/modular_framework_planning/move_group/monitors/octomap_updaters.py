@@ -175,7 +175,16 @@ class DepthImageUpdater(_Updater):
 def _cloud_message(header: Any, points: Any) -> PointCloud2:
     fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate("xyz")]
     data = np.ascontiguousarray(points, dtype=FLOAT_POINT).tobytes()
-    return PointCloud2(header, 1, len(points), fields, False, 12, 12 * len(points), data, True)
+    return PointCloud2(
+        header=header,
+        height=1,
+        width=len(points),
+        fields=fields,
+        point_step=12,
+        row_step=12 * len(points),
+        data=data,
+        is_dense=True,
+    )
 
 
 def updater_of(settings: SensorSettings, insert: InsertPointCloud) -> PointCloudUpdater | DepthImageUpdater:

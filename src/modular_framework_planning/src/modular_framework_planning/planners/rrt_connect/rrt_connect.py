@@ -72,14 +72,14 @@ def _trees(start: Array, goals: Array, extension_limit: int) -> Trees:
     states = np.empty((2, max(INITIAL_TREE_CAPACITY, 2 * len(goals)), len(start)))
     states[0, 0], states[1, : len(goals)] = start, goals
     return Trees(
-        states,
-        np.full(states.shape[:2], -1),
-        np.zeros(states.shape[:2], dtype=bool),
-        np.zeros(states.shape[:2]),
-        np.array([1, len(goals)]),
-        np.array([0, 0, EXTEND, NEAREST_UNKNOWN]),
-        start.copy(),
-        np.array([0, 0, extension_limit, EDGES_PER_CALL]),
+        states=states,
+        parents=np.full(states.shape[:2], -1),
+        blocked=np.zeros(states.shape[:2], dtype=bool),
+        lengths=np.zeros(states.shape[:2]),
+        sizes=np.array([1, len(goals)]),
+        cursor=np.array([0, 0, EXTEND, NEAREST_UNKNOWN]),
+        target=start.copy(),
+        counts=np.array([0, 0, extension_limit, EDGES_PER_CALL]),
     )
 
 
