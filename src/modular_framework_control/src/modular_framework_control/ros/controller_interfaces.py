@@ -122,7 +122,10 @@ class JointTrajectoryRosInterface:
             opened.callback(command.unregister)
             self._opened = opened.pop_all()
         controller.on_state = lambda snapshot: outbox.publish(
-            self._state, lambda: conversions.snapshot_to_msg(snapshot, controller.joint_names, loop_time.ahead_s)
+            self._state,
+            lambda: conversions.fill_snapshot(
+                JointTrajectoryControllerState(), snapshot, controller.joint_names, loop_time.ahead_s
+            ),
         )
         controller.on_feedback = lambda goal_handle, snapshot: outbox.put_droppable(
             self._feedback, goal_handle, snapshot

@@ -17,7 +17,6 @@ from control_msgs.msg import (
     FollowJointTrajectoryResult,
     GripperCommandFeedback,
     GripperCommandResult,
-    JointTrajectoryControllerState,
 )
 from controller_manager_msgs.msg import ControllerState, ControllerStatistics, HardwareInterfaceResources
 from sensor_msgs.msg import JointState
@@ -79,19 +78,6 @@ def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Seque
     message.error = _point(snapshot.error)
     message.desired.time_from_start = message.actual.time_from_start = genpy.Duration.from_sec(snapshot.elapsed_s)
     return message
-
-
-def snapshot_to_msg(
-    snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0
-) -> JointTrajectoryControllerState:
-    """Returns the state message of a trajectory controller.
-
-    Args:
-        snapshot: State of the controller.
-        joint_names: Joints of the controller.
-        ahead_s: Offset of the stamp from the time of the loop [s].
-    """
-    return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names, ahead_s)
 
 
 def gripper_result_to_msg(state: GripperState) -> GripperCommandResult:
