@@ -12,7 +12,7 @@ from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 from modular_framework_core.managers.acm import AcmManager, AcmResult
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
 from modular_framework_core.managers.ros_manager_services import ManagerServices
-from modular_framework_core.managers.ros_simulated_objects import new_movable_objects, simulated_models
+from modular_framework_core.managers.ros_simulated_objects import new_movable_objects, remove_deleted_objects
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
@@ -214,15 +214,7 @@ class AcmServices(ManagerServices):
                 )
 
     def _remove_deleted_objects(self) -> None:
-        """Removes objects that were deleted from the simulation."""
-        try:
-            models = simulated_models()
-        except CallError as error:
-            rospy.logwarn("collision matrix: the models of the simulation are unknown: %s", error)
-            return
-        if models is not None:
-            for name in self.manager.remove_missing(models):
-                rospy.loginfo("collision matrix: '%s' is no longer in the simulation and was removed", name)
+        remove_deleted_objects(self.manager.remove_missing, "collision matrix")
 
     def _add_simulated_objects(self) -> None:
         """Adds objects that appeared in the simulation since the last request."""

@@ -9,7 +9,7 @@ import rospy
 
 from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
 from modular_framework_core.managers.ros_manager_services import ManagerServices
-from modular_framework_core.managers.ros_simulated_objects import simulated_models
+from modular_framework_core.managers.ros_simulated_objects import remove_deleted_objects
 from modular_framework_core.srv import (
     AddGazeboMapping,
     AddGazeboMappingResponse,
@@ -18,7 +18,6 @@ from modular_framework_core.srv import (
     GetGazeboType,
     GetGazeboTypeResponse,
 )
-from modular_framework_ros.calls import CallError
 
 
 class ObjectTypeServices(ManagerServices):
@@ -47,15 +46,7 @@ class ObjectTypeServices(ManagerServices):
         ]
 
     def _remove_deleted_objects(self) -> None:
-        """Removes objects that were deleted from the simulation."""
-        try:
-            models = simulated_models()
-        except CallError as error:
-            rospy.logwarn("object types: the models of the simulation are unknown: %s", error)
-            return
-        if models is not None:
-            for name in self.types.remove_missing(models):
-                rospy.loginfo("object types: '%s' is no longer in the simulation and was removed", name)
+        remove_deleted_objects(self.types.remove_missing, "object types")
 
     def _add(self, request: Any) -> AddGazeboMappingResponse:
         self._remove_deleted_objects()

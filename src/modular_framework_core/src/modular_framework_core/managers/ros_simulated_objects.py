@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import rospy
 from gazebo_msgs.srv import (
@@ -22,19 +22,25 @@ SIMULATION_PARAMETER = "simulation"
 SERVICE_TIMEOUT_S = 3.0
 
 
-def simulated_models() -> list[str] | None:
-    """Returns the names of all models in the simulation, or None if the parameter ``simulation`` is not true.
+def remove_deleted_objects(remove_missing: Callable[[Collection[str]], list[str]], store: str) -> None:
+    """Removes the objects deleted from the simulation, if the parameter ``simulation`` is true; logs every failure.
 
-    Raises:
-        CallError: The simulation does not answer.
+    Args:
+        remove_missing: Function that keeps the objects of the given models and returns the names of those removed.
+        store: Name of the store, for messages.
     """
     if rospy.get_param(SIMULATION_PARAMETER, False) is not True:
-        return None
+        return
     name = "gazebo/get_world_properties"
-    response = request_service(name, GetWorldProperties, GetWorldPropertiesRequest(), SERVICE_TIMEOUT_S)
-    if not response.success:
-        raise CallError(f"service '{rospy.resolve_name(name)}' refused: {response.status_message}")
-    return list(response.model_names)
+    try:
+        response = request_service(name, GetWorldProperties, GetWorldPropertiesRequest(), SERVICE_TIMEOUT_S)
+        if not response.success:
+            raise CallError(f"service '{rospy.resolve_name(name)}' refused: {response.status_message}")
+    except CallError as error:
+        rospy.logwarn("%s: the models of the simulation are unknown: %s", store, error)
+        return
+    for removed in remove_missing(response.model_names):
+        rospy.loginfo("%s: '%s' is no longer in the simulation and was removed", store, removed)
 
 
 def new_movable_objects(known: Collection[str]) -> list[str]:
