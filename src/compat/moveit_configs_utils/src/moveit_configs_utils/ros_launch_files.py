@@ -12,6 +12,7 @@ import roslaunch.config
 import roslaunch.core
 import roslaunch.xmlloader
 import rospkg
+from launch.core.parameter_plan import nested
 
 from modular_framework_urdf.launch_arguments import ARGUMENT
 from modular_framework_urdf.xml_text import read, to_text
@@ -41,14 +42,7 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
         reason = str(error).partition("\nROS path")[0]  # rospkg lists the whole search path behind it
         LOGGER.warning("%s: its parameters are left out, roslaunch cannot load it: %s", path, reason)
         return {}
-    result: dict[str, Any] = {}
-    for name, parameter in sorted(config.params.items()):
-        *namespaces, last = name.strip("/").split("/")
-        inner = result
-        for namespace in namespaces:
-            inner = inner.setdefault(namespace, {})
-        inner[last] = parameter.value
-    return result
+    return nested({name: parameter.value for name, parameter in sorted(config.params.items())})
 
 
 def _arguments_without_value(path: Path) -> list[str]:
