@@ -153,7 +153,7 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
     with pytest.raises(MessageFileError, match="pipe.yaml is not a regular file; name a text file"):
         message_files.load(tmp_path / "pipe.yaml", "joint state", JointState)
-    faults = yaml_entries.read_each_entry(tmp_path / "pipe.yaml", lambda entry: None)
+    _, faults = yaml_entries.read_each_entry(tmp_path / "pipe.yaml", lambda entry: None)
     assert "is not a regular file" in str(faults[0])
     with pytest.raises(OSError, match="is not a valid path"):
         read_text(Path("a\0b"))

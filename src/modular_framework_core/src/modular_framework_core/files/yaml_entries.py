@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import yaml
 
@@ -14,6 +15,7 @@ from modular_framework_core.files import shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
 
 _NODE_LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries convert the text themselves, without tags
+Parsed = TypeVar("Parsed")
 
 
 class EntryError(ValueError):
@@ -163,16 +165,17 @@ def name_fault(name: str) -> str:
     return "" if name else "the name is empty; write a name"
 
 
-def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryError]:
-    """Calls a function with every entry of a file and continues after invalid entries.
+def read_each_entry(path: Path, parse: Callable[[Entry], Parsed]) -> tuple[list[Parsed], list[EntryError]]:
+    """Parses every entry of a file and continues after invalid entries.
 
     Args:
         path: YAML file.
-        handle: Function that raises EntryError for an invalid entry.
+        parse: Function that returns the content of an entry, and raises EntryError for an invalid entry.
 
     Returns:
-        One error per invalid entry, or one error for an unreadable file, in file order.
+        The contents of the valid entries, and one error per invalid entry or for an unreadable file, in file order.
     """
+    parsed: list[Parsed] = []
     faults: list[EntryError] = []
     try:
         for entry in read_entries(path):
@@ -181,9 +184,9 @@ def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryEr
                     raise entry
                 if fault := name_fault(entry.key):
                     raise EntryError(entry.path, entry.line, fault)
-                handle(entry)
+                parsed.append(parse(entry))
             except EntryError as error:
                 faults.append(error)
     except EntryError as error:
         faults.append(error)
-    return faults
+    return parsed, faults

@@ -60,6 +60,4 @@ def load_joint_states(
     Returns:
         The valid states in file order, and one error per invalid entry or for an unreadable file.
     """
-    states: list[NamedJointState] = []
-    faults = read_each_entry(path, lambda entry: states.append(parse_joint_state(entry, bounds or {})))
-    return states, faults
+    return read_each_entry(path, lambda entry: parse_joint_state(entry, bounds or {}))

@@ -129,6 +129,4 @@ def load_poses(path: Path) -> tuple[list[NamedPose], list[EntryError]]:
     Returns:
         The valid poses in file order, and one error per invalid entry or for an unreadable file.
     """
-    poses: list[NamedPose] = []
-    faults = read_each_entry(path, lambda entry: poses.append(parse_pose(entry)))
-    return poses, faults
+    return read_each_entry(path, parse_pose)

@@ -118,13 +118,11 @@ def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajec
     Returns:
         The valid trajectories in file order, and one error per invalid entry or for an unreadable file.
     """
-    trajectories: list[TimedTrajectory] = []
 
-    def add_trajectory(entry: Entry) -> None:
+    def parse_trajectory(entry: Entry) -> TimedTrajectory:
         waypoints = [parse_waypoint(item) for item in entry.items()]
         if not waypoints:
             raise entry.fault("contains no waypoint; write at least one waypoint")
-        trajectories.append(time_trajectory(entry.key, waypoints, lookup))
+        return time_trajectory(entry.key, waypoints, lookup)
 
-    faults = read_each_entry(path, add_trajectory)
-    return trajectories, faults
+    return read_each_entry(path, parse_trajectory)

@@ -100,5 +100,5 @@ def load_sensor_frames(
             raise entry.fault(f"frame '{frame.frame}' is its own origin; name a different origin frame")
         frames[frame.frame] = frame
 
-    faults = read_each_entry(path, add_frame)
+    _, faults = read_each_entry(path, add_frame)
     return list(frames.values()), faults
