@@ -59,7 +59,9 @@ def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(
     lab: Callable[..., PluginIndex], tmp_path: Path
 ) -> None:
     index = lab(("lab_arms/LabArm", "LabArm", ROBOT_HW_BASE))
-    with pytest.raises(PluginError, match="'lab_arms/Leg'; known: lab_arms/LabArm. A package offers one by <export>"):
+    with pytest.raises(
+        PluginError, match=r"'lab_arms/Leg'; known: lab_arms/LabArm\. A package.*; did you mean 'lab_arms/LabArm'\?$"
+    ):
         index.load("lab_arms/Leg", RobotHW)
     (tmp_path / "p.xml").write_text("<library")
     index.reload()

@@ -113,8 +113,9 @@ class PluginIndex:
             faults = f"; faulty descriptions: {'; '.join(self._faults)}" if self._faults else ""
             raise PluginError(
                 f"no package of this workspace offers a {self._base} named {name!r}; known: "
-                f"{', '.join(self.names) or 'none'}{nearest(name, self.names)}{faults}. A package offers one by "
+                f"{', '.join(self.names) or 'none'}{faults}. A package offers one by "
                 f'<export><{EXPORT_TAG} plugin="${{prefix}}/plugins.xml"/></export> in its package.xml'
+                f"{nearest(name, self.names)}"
             )
         if plugin.is_cpp:
             raise _cpp_error(plugin, expected)
