@@ -98,7 +98,7 @@ def test_a_condition_that_says_neither_is_refused(run: Run) -> None:
 
 
 def test_a_text_in_place_of_a_condition_is_refused() -> None:
-    with pytest.raises(TypeError, match=r"write IfCondition\(...\)"):
+    with pytest.raises(TypeError, match=r"such as IfCondition\(...\)"):
         LogInfo(msg="done", condition="true")
 
 
@@ -151,8 +151,8 @@ def test_a_function_that_fails_is_named_with_its_own_line(run: Run) -> None:
 
 def test_what_a_launch_does_not_offer_is_refused_with_what_to_do() -> None:
     with pytest.raises(
-        RuntimeError, match=r"test_arguments.py:\d+: .*OpaqueCoroutine is not offered: .*OpaqueFunction"
+        RuntimeError, match=r"test_arguments.py:\d+: .*OpaqueCoroutine is not supported: .*OpaqueFunction"
     ):
         from launch.actions import OpaqueCoroutine  # noqa: F401
-    with pytest.raises(RuntimeError, match="OnProcessIO is not offered"):
+    with pytest.raises(RuntimeError, match="OnProcessIO is not supported"):
         from launch.event_handlers import OnProcessIO  # noqa: F401

@@ -55,7 +55,7 @@ def log_start(event, context):
     [
         (f'ExecuteProcess(cmd=["false"], name="broken", on_exit=Shutdown()), {LONG}', 3, "broken"),
         (f'ExecuteProcess(cmd=["true"], on_exit=Shutdown(reason="done")), {LONG}', 0, "done"),
-        ('ExecuteProcess(cmd="exit 4", shell=True, name="broken")', 2, "cmd is one text"),
+        ('ExecuteProcess(cmd="exit 4", shell=True, name="broken")', 2, "cmd is a single text"),
         ('ExecuteProcess(cmd=["exit 4"], shell=True, name="broken")', 3, "everything has ended; failed: broken"),
         ('ExecuteProcess(cmd=["/no/such/program"])', 2, "/no/such/program"),
         ('ExecuteProcess(cmd=["true"], output="skreen")', 2, "did you mean 'screen'"),
@@ -131,7 +131,7 @@ def test_an_xml_file_runs_with_arguments_and_namespace(launch_file, launch_py, t
     refused = launch_py(tmp_path / "inner.launch", "greetin:=x", "must:=y")
     assert refused.returncode == 2
     assert "has no argument 'greetin'; did you mean 'greeting'" in refused.stdout
-    assert "needs the argument 'must'" in launch_py(tmp_path / "inner.launch").stdout
+    assert "requires the argument 'must'" in launch_py(tmp_path / "inner.launch").stdout
 
 
 def test_a_required_node_of_an_xml_file_ends_the_launch(launch_py, tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_the_command_names_what_is_wrong_with_its_words(launch_file, launch_py, 
         ((path, "arm=right"), "allowed: launch_py"),
         (("ur5_ezgripper_moveit_confg", "demo.launch.py"), "did you mean 'ur5_ezgripper_moveit_config'"),
         (("ur5_ezgripper_moveit_config", "dmo.launch.py"), "did you mean 'demo.launch.py'"),
-        ((tmp_path / "none.launch.py",), "there is no file"),
+        ((tmp_path / "none.launch.py",), "does not exist"),
     ):
         result = launch_py(*words)
         assert (result.returncode, message in result.stdout) == (2, True), result.stdout + result.stderr

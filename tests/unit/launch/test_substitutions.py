@@ -94,16 +94,16 @@ def test_an_anonymous_name_is_the_same_within_a_launch_and_another_in_the_next(c
     [
         (LaunchConfiguration("robott"), ["'robott' is not set", "did you mean 'robot'", "count, fake, robot"]),
         (EnvironmentVariable("PATHH"), ["'PATHH' is not set", "did you mean 'PATH'"]),
-        (FindExecutable("no-such-program"), ["program 'no-such-program' was not found", "PATH"]),
+        (FindExecutable("no-such-program"), ["program 'no-such-program' is not found", "PATH"]),
         (FileContent("/etc/hostnam"), ["/etc/hostnam cannot be read", "did you mean '/etc/hostname'"]),
         (Command("false"), ["'false' ended with exit code 1"]),
         (Command("no-such-program x"), ["'no-such-program x' cannot be run"]),
         (Command("sh -c 'echo wrong >&2'"), ["printed errors: wrong", "on_stderr='warn'"]),
         (Command("true", on_stderr="ignor"), ["on_stderr is 'ignor'", "did you mean 'ignore'"]),
-        (PythonExpression("panda == 'panda'"), ["NameError", "write quotes around texts"]),
+        (PythonExpression("panda == 'panda'"), ["NameError", "add quotes around texts"]),
         (NotSubstitution("maybe"), ["'maybe'", "true", "false"]),
         (LocalSubstitution("event.returncode"), ["no 'event'"]),
-        (ThisLaunchFileDir(), ["comes from no file"]),
+        (ThisLaunchFileDir(), ["does not come from a file"]),
     ],
 )
 def test_a_substitution_without_a_value_says_what_was_looked_for(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Python launch descriptions of ROS 2, carried out on ROS 1 with roslaunch's Python API."""
+"""ROS 2's Python launch descriptions, executed on ROS 1 with roslaunch's Python API."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of the base of actions."""
+"""Public name of the base class of actions."""
 
 from __future__ import annotations
 

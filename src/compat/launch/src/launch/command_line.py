@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `launch_py`: runs a launch file of a package, or shows its arguments."""
+"""Command `launch_py`, which runs a launch file or lists its arguments."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ USAGE = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a launch file to its end; returns the exit code, see LaunchService.run."""
+    """Runs a launch file to its end; returns the exit code, see `LaunchService.run`."""
     parser = argparse.ArgumentParser(prog="launch_py", usage=USAGE, description=main.__doc__)
-    parser.add_argument("--show-args", "-s", action="store_true", help="list the arguments of the file, start nothing")
+    parser.add_argument("--show-args", "-s", action="store_true", help="only list the arguments of the file")
     parser.add_argument("words", nargs="+", help="package and file, or the path of a file; then argument:=value")
     parsed = parser.parse_args(arguments)
     try:
@@ -48,11 +48,11 @@ def run_launch_file(path: Path, given: dict[str, str]) -> int:
     """Runs a launch file to its end.
 
     Args:
-        path: The file.
-        given: Values of its arguments.
+        path: Path of the launch file.
+        given: Values of its arguments, by name.
 
     Returns:
-        The exit code, see LaunchService.run.
+        The exit code, see `LaunchService.run`.
     """
     include = IncludeLaunchDescription(AnyLaunchDescriptionSource(str(path)), launch_arguments=given)
     include.where = "launch_py"
@@ -73,32 +73,32 @@ def run_launch_file(path: Path, given: dict[str, str]) -> int:
 
 
 def _file_and_arguments(words: Sequence[str]) -> tuple[Path, dict[str, str]]:
-    """Splits the words of the command line into the file and its arguments."""
+    """Splits the words of a command line into the launch file and the values of its arguments."""
     first = next((index for index, word in enumerate(words) if ":=" in word), len(words))
     names, assignments = words[:first], words[first:]
     given: dict[str, str] = {}
     for assignment in assignments:
         name, separator, value = assignment.partition(":=")
         if not separator or not name:
-            raise LaunchError(f"argument '{assignment}' is not of the form name:=value")
+            raise LaunchError(f"argument '{assignment}' does not have the form name:=value")
         given[name] = value
     match names:
         case [path] if Path(path).is_file():
             return Path(path).resolve(), given
         case [path, word, *_] if Path(path).is_file():
-            raise LaunchError(f"argument '{word}' is not of the form name:=value; allowed: {USAGE}")
+            raise LaunchError(f"argument '{word}' does not have the form name:=value; allowed: {USAGE}")
         case [package, file]:
             return file_of_package(package, file), given
         case [path] if "/" in path or path.endswith((".py", ".launch", ".xml")):
-            raise LaunchError(f"there is no file {Path(path).resolve()}; allowed: {USAGE}")
+            raise LaunchError(f"file {Path(path).resolve()} does not exist; allowed: {USAGE}")
     raise LaunchError(f"got '{' '.join(names)}'; allowed: {USAGE}")
 
 
 def file_of_package(package: str, file: str) -> Path:
-    """Returns the path of a launch file in a package: in its folder `launch`, or anywhere else in it.
+    """Returns the path of a launch file in a package, in its folder `launch` or any other folder.
 
     Raises:
-        LaunchError: There is no such package or file, or there are several files.
+        LaunchError: The package or file does not exist, or several files have the name.
     """
     folder = Path(package_share_directory(package))
     if (folder / "launch" / file).is_file():
@@ -110,12 +110,12 @@ def file_of_package(package: str, file: str) -> Path:
         raise LaunchError(f"package '{package}' has several files {file}: {listed(map(str, found))}; give a path")
     there = sorted({path.name for path in folder.rglob("*") if path.name.endswith(ENDINGS)})
     raise LaunchError(
-        f"package '{package}' ({folder}) has no launch file '{file}'{hint(file, there)}; there are: {listed(there)}"
+        f"package '{package}' ({folder}) has no launch file '{file}'{hint(file, there)}; known: {listed(there)}"
     )
 
 
 def argument_listing(description: LaunchDescription) -> str:
-    """Returns the arguments of a description, with descriptions and defaults."""
+    """Returns a listing of a description's arguments, with their descriptions and defaults."""
     lines = ["Arguments (pass arguments as '<name>:=<value>'):"]
     arguments = description.get_launch_arguments()
     for argument in arguments:

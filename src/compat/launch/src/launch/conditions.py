@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conditions of actions: on a text that says true or false, and on the value of a launch configuration."""
+"""Conditions of actions, which evaluate a text or a launch configuration."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ VALID_TRUE_EXPRESSIONS, VALID_FALSE_EXPRESSIONS = ["true", "1"], ["false", "0"]
 
 
 def evaluate_condition_expression(context: LaunchContext, expression: Iterable[Substitution]) -> bool:
-    """Returns whether a text says true (`true`, `1`) or false (`false`, `0`), in upper or lower case.
+    """Evaluates a text as true (`true`, `1`) or false (`false`, `0`), ignoring case.
 
     Raises:
-        InvalidConditionExpressionError: It says neither.
+        InvalidConditionExpressionError: The text is neither true nor false.
     """
     expression = list(expression)
     text = perform_substitutions(context, expression).strip().lower()
@@ -39,23 +39,23 @@ def evaluate_condition_expression(context: LaunchContext, expression: Iterable[S
     written = " + ".join(each.describe() for each in expression)
     allowed = ", ".join(VALID_TRUE_EXPRESSIONS + VALID_FALSE_EXPRESSIONS)
     raise InvalidConditionExpressionError(
-        f"the condition {written} is '{text}'; allowed: {allowed}; set it to one of them"
+        f"the condition {written} is '{text}'; allowed: {allowed}; set it to an allowed value"
     )
 
 
 class IfCondition(Condition):
-    """True when a text says true.
+    """Condition that holds if a text is true.
 
     Args:
-        predicate_expression: The text, with substitutions.
+        predicate_expression: Text of the condition, with substitutions.
     """
 
-    _wanted = True
+    _expected = True
 
     def __init__(self, predicate_expression: SomeSubstitutionsType) -> None:
         self._expression = normalize_to_list_of_substitutions(predicate_expression)
         super().__init__(
-            predicate=lambda context: evaluate_condition_expression(context, self._expression) is self._wanted
+            predicate=lambda context: evaluate_condition_expression(context, self._expression) is self._expected
         )
 
     def describe(self) -> str:
@@ -63,17 +63,17 @@ class IfCondition(Condition):
 
 
 class UnlessCondition(IfCondition):
-    """True when a text says false."""
+    """Condition that holds if a text is false."""
 
-    _wanted = False
+    _expected = False
 
 
 class LaunchConfigurationEquals(Condition):
-    """True when a launch configuration has a value; with None: when it is not set.
+    """Condition that holds if a launch configuration has a value; with None, if the configuration is not set.
 
     Args:
         launch_configuration_name: Name of the configuration.
-        expected_value: The value, with substitutions, or None.
+        expected_value: Expected value, with substitutions; None for a configuration that is not set.
     """
 
     def __init__(self, launch_configuration_name: str, expected_value: SomeSubstitutionsType | None) -> None:
@@ -90,7 +90,7 @@ class LaunchConfigurationEquals(Condition):
 
 
 class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
-    """True when a launch configuration has another value, or is not set; with None: when it is set."""
+    """Condition that holds if a launch configuration has another value or is not set; with None, if it is set."""
 
     def _compare(self, context: LaunchContext) -> bool:
         return not super()._compare(context)

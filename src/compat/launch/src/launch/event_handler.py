@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of event handlers."""
+"""Public names of event handlers."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Event handlers for the start and the end of processes, and for the end of the launch."""
+"""Event handlers for starts and exits of processes, and for the shutdown of the launch."""
 
 from __future__ import annotations
 
 from launch.actions.process_handlers import OnProcessExit, OnProcessStart, OnShutdown
-from launch.core.errors import refusal_of
+from launch.core.errors import unsupported_names
 
 __all__ = [
     "OnProcessExit",
@@ -12,11 +12,11 @@ __all__ = [
     "OnShutdown",
 ]
 
-NOT_OFFERED = {
-    "OnProcessIO": "the output of processes goes to the screen or to a log file, not through the launch",
+UNSUPPORTED = {
+    "OnProcessIO": "processes write their output to the screen or to a log file, not through the launch",
     "OnExecutionComplete": "use OnProcessExit for processes; other actions are complete when the next one is visited",
-    "OnIncludeLaunchDescription": "put the actions before the IncludeLaunchDescription",
+    "OnIncludeLaunchDescription": "move the actions before the IncludeLaunchDescription",
 }
-"""Event handlers of ROS 2 that are refused, with what to do."""
+"""Unsupported event handlers of ROS 2, with the alternative for the error message."""
 
-__getattr__ = refusal_of("launch.event_handlers", NOT_OFFERED)
+__getattr__ = unsupported_names("launch.event_handlers", UNSUPPORTED)

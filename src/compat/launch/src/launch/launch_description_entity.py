@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of the base of entities."""
+"""Public name of the base class of entities."""
 
 from __future__ import annotations
 

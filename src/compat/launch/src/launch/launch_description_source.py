@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of the base of launch files."""
+"""Public name of the base class of launch file sources."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch files: Python, and roslaunch's XML."""
+"""Public names of launch file sources, for Python and roslaunch's XML."""
 
 from __future__ import annotations
 

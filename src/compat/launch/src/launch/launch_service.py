@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch service: visits descriptions, starts what they ask for, and handles events until the end."""
+"""Launch service, which visits descriptions, starts processes, and handles events until the shutdown."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from launch.events.event import Event
 from launch.events.process import ProcessExited, ProcessStarted, ShutdownProcess, SignalProcess
 
 EXIT_BAD_LAUNCH = 2
-"""Exit code when a description cannot be carried out."""
-TICK_S = 0.1
+"""Exit code for a description that cannot be executed."""
+POLL_PERIOD_S = 0.1
 
 
 class LaunchService:
     """Runs launch descriptions.
 
-    A description is visited as a whole first; then its parameters are set, and only then are its processes started, in
-    order. So an error in its last action comes before anything has started.
+    The service visits a description completely, then sets its parameters, and then starts its processes in order. An
+    error in the last action is therefore reported before any process has started.
 
     Args:
         argv: Arguments of the launch.
-        noninteractive: Whether nobody sits at the terminal.
-        debug: Accepted; what roslaunch does is in its log.
-        check: Called with the context when everything was visited and nothing is started yet.
+        noninteractive: Whether the launch runs without a user at a terminal.
+        debug: Accepted without effect; see roslaunch's log.
+        check: Function that is called with the context after all visits and before the first start.
     """
 
     def __init__(
@@ -60,27 +60,26 @@ class LaunchService:
         self._exit_code = 0
 
     def include_launch_description(self, launch_description: LaunchDescription) -> None:
-        """Adds a description to run."""
+        """Adds a description."""
         self._descriptions.append(launch_description)
 
     def emit_event(self, event: Event) -> None:
-        """Lets an event happen; may be called from any thread."""
+        """Emits an event; may be called from any thread."""
         self._incoming.put(event)
 
     def shutdown(self, reason: str = "LaunchService.shutdown() was called") -> None:
-        """Ends the launch; may be called from any thread."""
+        """Shuts the launch down; may be called from any thread."""
         self.emit_event(Shutdown(reason=reason))
 
     def run(self, *, shutdown_when_idle: bool = True) -> int:
         """Runs the descriptions to their end.
 
         Args:
-            shutdown_when_idle: Whether it ends when nothing runs and no timer waits.
+            shutdown_when_idle: Whether to shut down if no process runs and no timer waits.
 
         Returns:
-            0 when the launch ended as its description, or a user, asked for; EXIT_BAD_LAUNCH when the description
-            cannot be carried out; EXIT_NODE_DIED when a process that another action requires failed, or when
-            everything has ended and a process had failed.
+            0 after a shutdown by the description or a user; EXIT_BAD_LAUNCH if a description cannot be executed;
+            EXIT_NODE_DIED if a required process failed, or if any process had failed when the last process ended.
         """
         with self._signals(), _environment_kept(self.context):
             try:
@@ -101,7 +100,7 @@ class LaunchService:
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        """Ends the launch at SIGINT, SIGTERM and SIGHUP, in the order of a launch."""
+        """Converts SIGINT, SIGTERM and SIGHUP into a regular shutdown of the launch."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -124,7 +123,7 @@ class LaunchService:
             self._visit(entity.visit(self.context) or ())
 
     def _start_requested(self) -> None:
-        """Sets the planned parameters, then starts the requested processes and timers."""
+        """Sets the planned parameters, and starts the requested processes and timers."""
         context = self.context
         requests, context.requests = context.requests, []
         self._check_names(requests)
@@ -133,8 +132,8 @@ class LaunchService:
             for request in requests:
                 if request.prepare is not None:
                     request.prepare(self._parameter)
-            cleared = context.parameters.take_cleared()
-            self._session.set_parameters(context.parameters.take_changed(), cleared)
+            cleared = context.parameters.pop_cleared()
+            self._session.set_parameters(context.parameters.pop_changed(), cleared)
         for request in requests:
             self._session.start(request)
         now_s = time.monotonic()
@@ -142,12 +141,12 @@ class LaunchService:
         context.new_timers = []
 
     def _check_names(self, requests: Iterable[ProcessRequest]) -> None:
-        """Refuses a second node of a name: the master would end the first one."""
+        """Raises LaunchError for a second node with the same name, as the master would shut down the first node."""
         taken = {running.request.node_name for running in (self._session.running if self._session else ())}
         for request in requests:
             if request.node_name in taken and request.node_name:
                 error = LaunchError(
-                    f"there are two nodes {request.node_name}; allowed: one node of a name; give this one another "
+                    f"there are two nodes {request.node_name}; allowed: one node per name; give this node another "
                     "name=... or namespace=..."
                 )
                 error.where = request.action.where if request.action is not None else ""
@@ -184,7 +183,7 @@ class LaunchService:
             if event is not None:
                 self._handle(event)
             elif self._session is not None and self._session.ended:
-                self._handle(self._required_death())
+                self._handle(self._shutdown_of_required())
             elif shutdown_when_idle and self._is_idle():
                 self._handle(Shutdown(reason="everything has ended", exit_code=EXIT_NODE_DIED if self._failed else 0))
 
@@ -193,7 +192,7 @@ class LaunchService:
 
     def _next_incoming(self) -> Event | None:
         try:
-            return self._incoming.get(timeout=0.0 if self._is_idle() else TICK_S)
+            return self._incoming.get(timeout=0.0 if self._is_idle() else POLL_PERIOD_S)
         except queue.Empty:
             return None
 
@@ -204,12 +203,12 @@ class LaunchService:
                 return TimerEvent(timer_action=entry[1])
         return None
 
-    def _required_death(self) -> Shutdown:
+    def _shutdown_of_required(self) -> Shutdown:
         name, exit_code = self._session.required_death or ("a required node", 1)
         return Shutdown(reason=f"required node {name} ended", exit_code=EXIT_NODE_DIED if exit_code else 0)
 
     def _handle(self, event: Event) -> None:
-        """Visits what handlers say to an event, and does what the event itself asks for."""
+        """Visits the entities of the event's handlers, and executes the event itself."""
         if isinstance(event, TimerEvent):
             self._handle_timer(event.timer_action)
         for handler, configurations in self.context.handlers_of(event):
@@ -230,7 +229,7 @@ class LaunchService:
             return normalize_to_list_of_entities(handler.handle(event, self.context))
         except LaunchError:
             raise
-        except Exception as error:  # a launch file is a program, whose functions may raise anything
+        except Exception as error:  # functions of a launch file may raise anything
             raise located_error(f"{type(handler).__name__}", error, "") from error
 
     def _handle_timer(self, timer: TimerAction) -> None:
@@ -242,7 +241,7 @@ class LaunchService:
         self.context.is_shutdown = True
         self._exit_code = event.exit_code
         failed = f"; failed: {', '.join(dict.fromkeys(self._failed))}" if self._failed else ""
-        get_logger().info("the launch ends: %s%s", event.reason, failed)
+        get_logger().info("the launch shuts down: %s%s", event.reason, failed)
 
     def _reach_processes(self, event: ShutdownProcess | SignalProcess) -> None:
         for running in self._session.running if self._session is not None else ():
@@ -268,7 +267,7 @@ def _described(running: Any) -> tuple[Any, str, list[str], int, str | None, dict
 
 @contextmanager
 def _environment_kept(context: LaunchContext) -> Iterator[None]:
-    """Puts the environment back at the end that was there at the beginning."""
+    """Restores the initial environment at the end."""
     try:
         yield
     finally:

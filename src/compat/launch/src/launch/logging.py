@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of what the launch says on the screen."""
+"""Public name of the launch's logger."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where ROS packages and their programs are."""
+"""Finds ROS packages and their executables."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from launch.core.errors import LaunchError, PackageNotFoundError, hint, listed
 
 @functools.lru_cache(maxsize=4)
 def _finder(search_path: str) -> rospkg.RosPack:
-    """Returns the look-up for a value of ROS_PACKAGE_PATH; made once, because it crawls all folders."""
+    """Returns the package finder for a value of ROS_PACKAGE_PATH; cached, because the finder crawls all folders."""
     del search_path
     return rospkg.RosPack()
 
@@ -25,10 +25,10 @@ def _current_finder() -> rospkg.RosPack:
 
 
 def package_share_directory(package: str) -> str:
-    """Returns the folder of a package's files.
+    """Returns the share folder of a package.
 
     Raises:
-        PackageNotFoundError: There is no such package.
+        PackageNotFoundError: The package does not exist.
     """
     finder = _current_finder()
     try:
@@ -36,16 +36,16 @@ def package_share_directory(package: str) -> str:
     except rospkg.ResourceNotFound:
         raise PackageNotFoundError(
             f"there is no package '{package}'{hint(package, finder.list())}; ROS_PACKAGE_PATH has "
-            f"{len(finder.list())} packages; install it, or build and source the workspace that has it"
+            f"{len(finder.list())} packages; install it, or build and source the workspace that contains it"
         ) from None
 
 
 def program_of_package(package: str, program: str) -> str:
-    """Returns the path of a package's program, as rosrun would run it.
+    """Returns the path of a package's executable, as found by rosrun.
 
     Raises:
-        PackageNotFoundError: There is no such package.
-        LaunchError: It has no such program.
+        PackageNotFoundError: The package does not exist.
+        LaunchError: The package does not have the executable.
     """
     package_share_directory(package)
     found = roslib.packages.find_node(package, program, rospack=_current_finder())
@@ -53,13 +53,13 @@ def program_of_package(package: str, program: str) -> str:
         return str(found[0])
     there = programs_of_package(package)
     raise LaunchError(
-        f"package '{package}' has no executable '{program}'{hint(program, there)}; there are: {listed(there)}; correct "
+        f"package '{package}' has no executable '{program}'{hint(program, there)}; known: {listed(there)}; correct "
         "the name, or build the workspace and make the file executable (chmod +x)"
     )
 
 
 def programs_of_package(package: str) -> set[str]:
-    """Returns the names of the executable files of a package."""
+    """Returns the names of a package's executable files."""
     share = Path(package_share_directory(package))
     prefixes = [Path(each) for each in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if each]
     folders = [share, *(prefix / "lib" / package for prefix in [share.parent.parent, *prefixes])]
@@ -71,10 +71,10 @@ def programs_of_package(package: str) -> set[str]:
 
 
 def plugin_descriptions(package: str) -> list[Path]:
-    """Returns the plugin descriptions that ROS packages, and the package itself, export to a package.
+    """Returns the plugin description files that ROS packages export to a package, including its own files.
 
     Raises:
-        PackageNotFoundError: There is no such package.
+        PackageNotFoundError: The package does not exist.
     """
     package_share_directory(package)
     finder = _current_finder()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs processes with roslaunch's Python API: its master, its parameter server and its process monitor."""
+"""Runs processes with the master, parameter server and process monitor of roslaunch's Python API."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ CALLER = "/launch_py"
 
 @dataclass(eq=False)
 class RunningProcess:
-    """A process that was started.
+    """Started process.
 
     Attributes:
-        request: What it was started from.
-        process: roslaunch's process.
-        seen_starts: How many of its starts were reported.
-        seen_ends: How many of its ends were reported.
+        request: Request of the process.
+        process: Process object of roslaunch.
+        seen_starts: Number of reported starts.
+        seen_ends: Number of reported exits.
     """
 
     request: ProcessRequest
@@ -43,17 +43,17 @@ class RunningProcess:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Returns the process id."""
         return int(self.process.pid)
 
 
 class RosProcessSession(roslaunch.pmon.ProcessListener):
-    """A master, its parameters, and processes with the restarts and timeouts of roslaunch.
+    """ROS master with parameters, and processes with roslaunch's respawning and timeouts.
 
-    A master that runs already at ROS_MASTER_URI is used, otherwise one is started and ends with the session.
+    A running master at ROS_MASTER_URI is used; otherwise, a master is started and ends with the session.
 
     Args:
-        on_exit: Called, in roslaunch's thread, with a process and its exit code.
+        on_exit: Function that is called in roslaunch's thread with a process and its exit code.
     """
 
     def __init__(self, on_exit: Callable[[RunningProcess, int], None]) -> None:
@@ -67,24 +67,24 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
 
     @property
     def running(self) -> list[RunningProcess]:
-        """Processes that run, or wait for their restart."""
+        """Returns the processes that run or wait for their respawn."""
         with self._lock:
             return list(self._running.values())
 
     @property
     def ended(self) -> bool:
-        """Whether roslaunch itself has ended everything, because a required node of an XML launch file ended."""
+        """Returns whether roslaunch has stopped all processes, because a required node of an XML file has ended."""
         return self._parent is not None and self._parent.pm is not None and self._parent.pm.is_shutdown
 
     def connect(self) -> None:
-        """Connects to the master, or starts one; may be called twice.
+        """Connects to the master, or starts a master; may be called twice.
 
         Raises:
-            LaunchError: There is none and none can be started.
+            LaunchError: No master is running and no master can be started.
         """
         if self._parent is not None:
             return
-        roslib.set_interactive(True)  # signals are for the launch, which lets its event handlers run first
+        roslib.set_interactive(True)  # the launch handles signals, so that its event handlers run first
         try:
             self._run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
             roslaunch.configure_logging(self._run_id)
@@ -98,14 +98,14 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
             raise LaunchError(f"no ROS master at {rosgraph.get_master_uri()}: {error}") from error
 
     def set_parameters(self, values: Mapping[str, Any], cleared: list[str]) -> None:
-        """Sets parameters, after removing some with all below them.
+        """Sets parameters after removing others.
 
         Args:
             values: Values by full name.
-            cleared: Full names.
+            cleared: Full names of parameters to remove, including all parameters below.
 
         Raises:
-            LaunchError: The parameter server refused one.
+            LaunchError: The parameter server rejected a parameter.
         """
         if not values and not cleared:
             return
@@ -121,7 +121,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
                 raise LaunchError(f"parameter {name} was not set: {message}")
 
     def parameter(self, name: str) -> Any:
-        """Returns a value of the parameter server; None when there is none."""
+        """Returns a value of the parameter server; None if the parameter is not set."""
         code, _, value = self._connected().config.master.get().getParam(CALLER, name)
         return value if code == 1 else None
 
@@ -129,7 +129,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
         """Starts a process.
 
         Raises:
-            LaunchError: Its program is not there or cannot be run.
+            LaunchError: The program does not exist or cannot be executed.
         """
         parent = self._connected()
         try:
@@ -138,23 +138,23 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
             with self._lock:
                 self._running[process.name] = running
             parent.pm.register(process)
-            process.start()  # one that has ended meanwhile is reported as any other
+            process.start()  # an immediate exit is reported as any other exit
         except (roslaunch.core.RLException, roslaunch.node_args.NodeParamsException) as error:
             raise LaunchError(f"{request.name}: {error}") from error
         return running
 
     def stop(self, running: RunningProcess) -> None:
-        """Ends one process: SIGINT, after its timeouts SIGTERM and SIGKILL; it does not start again."""
+        """Stops a process with SIGINT, and after timeouts with SIGTERM and SIGKILL; the process does not respawn."""
         running.process.respawn = False
         running.process.stop([])
 
     def close(self) -> None:
-        """Ends all processes, and the master if it was started here; may be called twice."""
+        """Stops all processes, and the master if this session started it; may be called twice."""
         if self._parent is not None:
             self._parent.shutdown()
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Called by roslaunch's process monitor; again and again for a process that waits for its restart."""
+        """Handles an exit; roslaunch's process monitor calls this repeatedly while a process waits for its respawn."""
         with self._lock:
             running = self._running.get(process_name)
         if running is None or running.seen_ends >= running.process.spawn_count:
@@ -172,7 +172,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
 
     def _connected(self) -> roslaunch.parent.ROSLaunchParent:
         if self._parent is None:
-            raise LaunchError("connect() comes before parameters and processes")
+            raise LaunchError("call connect() before setting parameters or starting processes")
         return self._parent
 
     def _process_of(self, request: ProcessRequest) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of what may stand where entities are wanted."""
+"""Public name of the type of one or several entities."""
 
 from __future__ import annotations
 

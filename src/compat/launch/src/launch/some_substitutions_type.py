@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Public name of what may stand where a text is wanted."""
+"""Public name of the type of texts with substitutions."""
 
 from __future__ import annotations
 

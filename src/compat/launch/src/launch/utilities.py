@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns what users may write for a text, entities or a typed value into one form."""
+"""Public names of functions that normalize arguments of actions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions: what a launch description does, in order."""
+"""Actions, which a launch description executes in order."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from launch.actions.events import EmitEvent, RegisterEventHandler, Shutdown, Tim
 from launch.actions.execute_process import ExecuteLocal, ExecuteProcess
 from launch.actions.functions import LogInfo, OpaqueFunction
 from launch.actions.grouping import GroupAction, IncludeLaunchDescription
-from launch.core.errors import refusal_of
+from launch.core.errors import unsupported_names
 
 __all__ = [
     "AppendEnvironmentVariable",
@@ -51,7 +51,7 @@ __all__ = [
     "UnsetLaunchConfiguration",
 ]
 
-NOT_OFFERED = {"OpaqueCoroutine": "the launch has no asyncio loop; use OpaqueFunction, or a process of its own"}
-"""Actions of ROS 2 that are refused, with what to do."""
+UNSUPPORTED = {"OpaqueCoroutine": "the launch has no asyncio loop; use OpaqueFunction, or a separate process"}
+"""Unsupported actions of ROS 2, with the alternative for the error message."""
 
-__getattr__ = refusal_of("launch.actions", NOT_OFFERED)
+__getattr__ = unsupported_names("launch.actions", UNSUPPORTED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions that set launch configurations: arguments with their defaults, single values, scopes."""
+"""Actions on launch configurations: arguments with defaults, values, and scopes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from launch.core.utilities import normalize_to_list_of_substitutions, perform_su
 
 
 class DeclareLaunchArgument(Action):
-    """A launch argument, which becomes a launch configuration of the same name.
+    """Declares a launch argument, which becomes a launch configuration of the same name.
 
     Args:
-        name: Its name.
-        default_value: Its value when none is given; without it, one must be given.
-        description: What it is for.
-        choices: The values that are allowed; None for all.
+        name: Name of the argument.
+        default_value: Default value; an argument without a default must be given.
+        description: Description of the argument.
+        choices: Allowed values; None for all values.
     """
 
     def __init__(
@@ -48,17 +48,17 @@ class DeclareLaunchArgument(Action):
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Returns the name of the argument."""
         return self._name
 
     @property
     def default_value(self) -> list[Substitution] | None:
-        """Its value when none is given."""
+        """Returns the default value."""
         return self._default
 
     @property
     def description(self) -> str:
-        """What it is for, and what is allowed."""
+        """Returns the description, including the allowed values."""
         text = self._description or ("" if self._choices else "no description given")
         if not self._choices:
             return text
@@ -67,7 +67,7 @@ class DeclareLaunchArgument(Action):
 
     @property
     def choices(self) -> list[str] | None:
-        """The values that are allowed; None for all."""
+        """Returns the allowed values; None for all values."""
         return self._choices
 
     def describe(self) -> str:
@@ -79,7 +79,7 @@ class DeclareLaunchArgument(Action):
         if self._name not in configurations:
             if self._default is None:
                 about = f" ({self._description})" if self._description else ""
-                raise self._error(f"argument '{self._name}'{about} has no value; give it: {self._name}:=VALUE")
+                raise self._error(f"argument '{self._name}'{about} has no value; give {self._name}:=VALUE")
             configurations[self._name] = perform_substitutions(context, self._default)
         value = configurations[self._name]
         if self._choices is not None and value not in self._choices:
@@ -87,7 +87,7 @@ class DeclareLaunchArgument(Action):
 
     def _allowed(self, value: str) -> str:
         choices = self._choices or []
-        return f"allowed: {', '.join(choices)}{hint(value, choices)}; give one of them"
+        return f"allowed: {', '.join(choices)}{hint(value, choices)}; give an allowed value"
 
     def _error(self, message: str) -> LaunchError:
         error = LaunchError(message)
@@ -99,8 +99,8 @@ class SetLaunchConfiguration(SetNamedValue):
     """Sets a launch configuration.
 
     Args:
-        name: Its name.
-        value: Its value.
+        name: Name of the configuration.
+        value: Value of the configuration.
     """
 
     def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
@@ -108,10 +108,10 @@ class SetLaunchConfiguration(SetNamedValue):
 
 
 class UnsetLaunchConfiguration(UnsetNamedValue):
-    """Forgets a launch configuration.
+    """Removes a launch configuration.
 
     Args:
-        name: Its name.
+        name: Name of the configuration.
     """
 
     def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
@@ -119,7 +119,7 @@ class UnsetLaunchConfiguration(UnsetNamedValue):
 
 
 class PushLaunchConfigurations(Action):
-    """Begins a scope of launch configurations."""
+    """Starts a scope of launch configurations."""
 
     def execute(self, context: LaunchContext) -> None:
         context.push_launch_configurations()
@@ -133,10 +133,10 @@ class PopLaunchConfigurations(Action):
 
 
 class ResetLaunchConfigurations(Action):
-    """Forgets all launch configurations but some.
+    """Removes all launch configurations and sets new configurations.
 
     Args:
-        launch_configurations: What is set afterwards, by name; evaluated before.
+        launch_configurations: New configurations by name, evaluated before the removal.
     """
 
     def __init__(

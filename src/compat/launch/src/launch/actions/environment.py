@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions that change the environment of the processes that come after them."""
+"""Actions on the environment variables of subsequent processes."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class SetEnvironmentVariable(SetNamedValue):
     """Sets an environment variable.
 
     Args:
-        name: Its name.
-        value: Its value.
+        name: Name of the variable.
+        value: Value of the variable.
     """
 
     def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
@@ -30,13 +30,13 @@ class SetEnvironmentVariable(SetNamedValue):
 
 
 class AppendEnvironmentVariable(Action):
-    """Adds a value to an environment variable.
+    """Appends a value to an environment variable.
 
     Args:
-        name: Its name.
-        value: The value to add.
-        prepend: Whether it comes first.
-        separator: What stands between the values.
+        name: Name of the variable.
+        value: Value to append.
+        prepend: Whether the value is prepended instead.
+        separator: Separator of the values.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class UnsetEnvironmentVariable(UnsetNamedValue):
     """Removes an environment variable.
 
     Args:
-        name: Its name.
+        name: Name of the variable.
     """
 
     def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
@@ -70,7 +70,7 @@ class UnsetEnvironmentVariable(UnsetNamedValue):
 
 
 class PushEnvironment(Action):
-    """Begins a scope of the environment."""
+    """Starts a scope of the environment."""
 
     def execute(self, context: LaunchContext) -> None:
         context.push_environment()
@@ -84,7 +84,7 @@ class PopEnvironment(Action):
 
 
 class ResetEnvironment(Action):
-    """Puts the environment back that the launch began with."""
+    """Restores the initial environment of the launch."""
 
     def execute(self, context: LaunchContext) -> None:
         context.reset_environment()

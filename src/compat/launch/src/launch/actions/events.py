@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions about events: handlers, events that a description lets happen, the end of the launch, timers."""
+"""Actions on events: event handlers, emitted events, the shutdown of the launch, and timers."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ EXIT_NODE_DIED = 3
 
 
 class _EventHandlerAction(Action):
-    """Base of actions on an event handler.
+    """Base class of actions on an event handler.
 
     Args:
-        event_handler: The handler.
+        event_handler: The event handler.
     """
 
     def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         if not isinstance(event_handler, BaseEventHandler):
             raise TypeError(
-                f"{self.where}: {type(self).__name__}: got {event_handler!r}; allowed: a handler of "
+                f"{self.where}: {type(self).__name__}: got {event_handler!r}; allowed: an event handler of "
                 "launch.event_handlers"
             )
         self._handler = event_handler
 
     @property
     def event_handler(self) -> BaseEventHandler:
-        """The handler."""
+        """Returns the event handler."""
         return self._handler
 
 
@@ -55,14 +55,14 @@ class RegisterEventHandler(_EventHandlerAction):
 
 
 class UnregisterEventHandler(_EventHandlerAction):
-    """Removes an event handler that was registered."""
+    """Removes a registered event handler."""
 
     def execute(self, context: LaunchContext) -> None:
         context.unregister_event_handler(self._handler)
 
 
 class EmitEvent(Action):
-    """Lets an event happen.
+    """Emits an event.
 
     Args:
         event: The event.
@@ -75,7 +75,7 @@ class EmitEvent(Action):
 
     @property
     def event(self) -> Event:
-        """The event."""
+        """Returns the event."""
         return self._event
 
     def execute(self, context: LaunchContext) -> None:
@@ -83,10 +83,10 @@ class EmitEvent(Action):
 
 
 class Shutdown(Action):
-    """Ends the launch. As `on_exit` of a node it makes the node a required one.
+    """Shuts the launch down; as `on_exit` of a node, this action makes the node required.
 
     Args:
-        reason: Why, for the message.
+        reason: Reason for the message.
     """
 
     def __init__(self, *, reason: SomeSubstitutionsType = "reason not given", **kwargs: Any) -> None:
@@ -97,18 +97,18 @@ class Shutdown(Action):
         event = context.get_locals_as_dict().get("event")
         reason, exit_code = perform_text(context, self._reason), 0
         if isinstance(event, ProcessExited):
-            get_logger().info("process [%s] was required: the launch ends", event.process_name)
+            get_logger().info("required process [%s] has ended: the launch shuts down", event.process_name)
             exit_code = EXIT_NODE_DIED if event.returncode else 0
         context.emit_event_sync(ShutdownEvent(reason=reason, exit_code=exit_code))
 
 
 class TimerAction(Action):
-    """Does other actions after a time, once.
+    """Executes actions once after a delay.
 
     Args:
-        period: The time [s].
-        actions: What is done then.
-        cancel_on_shutdown: Accepted; the end of the launch cancels all timers.
+        period: Delay [s].
+        actions: Actions to execute.
+        cancel_on_shutdown: Accepted without effect; a shutdown always cancels all timers.
     """
 
     def __init__(
@@ -129,16 +129,16 @@ class TimerAction(Action):
 
     @property
     def actions(self) -> list[LaunchDescriptionEntity]:
-        """What is done."""
+        """Returns the actions to execute."""
         return self._actions
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was cancelled."""
+        """Returns whether the timer was cancelled."""
         return self._cancelled
 
     def cancel(self) -> None:
-        """Forgets the actions."""
+        """Cancels the timer."""
         self._cancelled = True
 
     def execute(self, context: LaunchContext) -> None:

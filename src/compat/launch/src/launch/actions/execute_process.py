@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ExecuteProcess: starts a program under roslaunch's process monitor."""
+"""ExecuteProcess, which starts a program under roslaunch's process monitor."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from launch.core.utilities import normalize_to_list_of_substitutions, perform_bo
 from launch.substitutions.text import LaunchConfiguration, described
 
 OUTPUTS = {"screen": True, "both": True, "full": True, "log": False, "own_log": False}
-"""Values of `output`, and whether standard output goes to the screen."""
+"""Allowed values of `output`, and whether standard output is printed on the screen."""
 DEFAULT_TIMEOUTS_S = {"sigterm_timeout": 15.0, "sigkill_timeout": 5.0}
-"""Time after SIGINT until SIGTERM, as in roslaunch, and then until SIGKILL [s]."""
-NOT_OFFERED = ("emulate_tty", "output_format", "cached_output", "log_cmd")
-"""Options of ROS 2 about how the launch shows output; accepted, because processes write their output themselves."""
+"""Times from SIGINT to SIGTERM, as in roslaunch, and from SIGTERM to SIGKILL [s]."""
+UNSUPPORTED = ("emulate_tty", "output_format", "cached_output", "log_cmd")
+"""Options of ROS 2 for the output of processes; accepted without effect, because processes write their own output."""
 
 
 class ExecuteLocal(Action):
-    """A program to start.
+    """Starts a program.
 
     Args:
-        cmd: Program and arguments; each may be several substitutions, which are joined.
-        prefix: Put before the command, such as a debugger; from the configuration `launch-prefix` when not given.
-        name: Name of the process in messages; by default that of the program.
-        cwd: Its working folder; by default that of the launch.
-        env: Its whole environment.
-        additional_env: Variables to add to the environment.
-        shell: Whether a shell runs the command.
+        cmd: Program and arguments; each element may be a sequence of substitutions, which is concatenated.
+        prefix: Prefix of the command, such as a debugger; the default is the configuration `launch-prefix`.
+        name: Name of the process in messages; the default is the name of the program.
+        cwd: Working folder; the default is the folder of the launch.
+        env: Complete environment.
+        additional_env: Additional environment variables.
+        shell: Whether a shell executes the command.
         options: `output` (screen, both, full: on the screen; log, own_log: in a file), `respawn`, `respawn_delay` [s],
             `respawn_max_retries`, `sigterm_timeout`, `sigkill_timeout` [s], `on_exit`, `condition`.
     """
@@ -57,23 +57,23 @@ class ExecuteLocal(Action):
     ) -> None:
         super().__init__(condition=options.pop("condition", None))
         if isinstance(cmd, str | Substitution):
-            raise TypeError(f"{self.where}: cmd is one text; allowed: a list of program and arguments; write cmd=[...]")
+            raise TypeError(f"{self.where}: cmd is a single text; allowed: a list of program and arguments, cmd=[...]")
         self._cmd = [normalize_to_list_of_substitutions(part) for part in cmd]
         self._prefix, self._name, self._cwd = prefix, name, cwd
         self._env, self._additional_env, self._shell = env, dict(additional_env or {}), shell
         self._on_exit = options.pop("on_exit", None)
-        self._options = {key: value for key, value in options.items() if key not in NOT_OFFERED}
+        self._options = {key: value for key, value in options.items() if key not in UNSUPPORTED}
         unknown = sorted(set(self._options) - set(_OPTION_DEFAULTS))
         if unknown:
             allowed = sorted((*_OPTION_DEFAULTS, "on_exit", "condition"))
             raise TypeError(
                 f"{self.where}: {type(self).__name__}: unknown argument '{unknown[0]}'{hint(unknown[0], allowed)}; "
-                f"allowed: {', '.join(allowed)} and those of its signature"
+                f"allowed: {', '.join(allowed)} and the arguments of the signature"
             )
 
     @property
     def cmd(self) -> list[list[Substitution]]:
-        """Program and arguments."""
+        """Returns program and arguments."""
         return self._cmd
 
     def describe(self) -> str:
@@ -85,7 +85,7 @@ class ExecuteLocal(Action):
         context.requests.append(self.process_request(context))
 
     def process_request(self, context: LaunchContext) -> ProcessRequest:
-        """Returns what is to be started."""
+        """Returns the request to start the process."""
         command = [perform_text(context, part) for part in self._cmd]
         if not command or not command[0]:
             raise LaunchError("the command is empty; allowed: a program and its arguments")
@@ -102,7 +102,7 @@ class ExecuteLocal(Action):
         )
 
     def prefix_of(self, context: LaunchContext, program: str) -> list[str]:
-        """Returns what is put before the command of a program."""
+        """Returns the prefix of the command."""
         prefix = self._prefix if self._prefix is not None else LaunchConfiguration("launch-prefix", default="")
         only = perform_text(context, LaunchConfiguration("launch-prefix-filter", default=""))
         if self._prefix is None and only and not re.match(only, os.path.basename(program)):
@@ -157,4 +157,4 @@ def _performed(context: LaunchContext, texts: Mapping[Any, SomeSubstitutionsType
 
 
 class ExecuteProcess(ExecuteLocal):
-    """A program to start; see ExecuteLocal."""
+    """Starts a program; see `ExecuteLocal`."""

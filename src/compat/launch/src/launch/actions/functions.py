@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions that call a function of the launch file, or say something."""
+"""Actions that call a function of the launch file or log a message."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from launch.core.utilities import (
 
 
 class OpaqueFunction(Action):
-    """Calls a function with the launch context; what it returns is visited next.
+    """Calls a function with the launch context, and visits the returned entities.
 
     Args:
-        function: Called as `function(context, *args, **kwargs)`; returns entities, or None.
-        args: Further arguments.
-        kwargs: Further named arguments.
+        function: Function that is called as `function(context, *args, **kwargs)` and returns entities or None.
+        args: Further positional arguments.
+        kwargs: Further keyword arguments.
     """
 
     def __init__(
@@ -52,10 +52,10 @@ class OpaqueFunction(Action):
 
 
 class LogInfo(Action):
-    """Says something on the screen.
+    """Logs a message on the screen.
 
     Args:
-        msg: The text.
+        msg: The message.
     """
 
     def __init__(self, *, msg: SomeSubstitutionsType, **kwargs: Any) -> None:
@@ -64,7 +64,7 @@ class LogInfo(Action):
 
     @property
     def msg(self) -> list[Substitution]:
-        """The text."""
+        """Returns the message."""
         return self._msg
 
     def execute(self, context: LaunchContext) -> None:

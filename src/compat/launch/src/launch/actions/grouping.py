@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions that hold other actions: a group with a scope of its own, and another launch file."""
+"""Actions that contain other actions: a group with its own scope, and an included launch file."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from launch.core.utilities import normalize_to_list_of_entities, perform_text
 
 
 class GroupAction(Action):
-    """Several actions, on one condition and in one scope.
+    """Executes several actions on one condition and in one scope.
 
     Args:
         actions: The actions.
-        scoped: Whether configurations and environment are after the group what they were before.
-        forwarding: Whether a scoped group begins with the configurations around it.
-        launch_configurations: Configurations to set at the beginning, by name.
+        scoped: Whether configurations and environment are restored after the group.
+        forwarding: Whether a scoped group inherits the configurations of the enclosing scope.
+        launch_configurations: Initial configurations, by name.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class GroupAction(Action):
         self._configurations = dict(launch_configurations or {})
 
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """Returns the actions, between those that begin and end the scope."""
+        """Returns the actions, enclosed by the actions that start and end the scope."""
         settings: list[LaunchDescriptionEntity] = [
             SetLaunchConfiguration(name, value) for name, value in self._configurations.items()
         ]
@@ -68,7 +68,7 @@ class GroupAction(Action):
 
 
 class _SetLaunchFile(Action):
-    """Says which launch file is being visited."""
+    """Sets the launch file that is being visited."""
 
     def __init__(self, path: str | None) -> None:
         super().__init__()
@@ -80,12 +80,12 @@ class _SetLaunchFile(Action):
 
 
 class IncludeLaunchDescription(Action):
-    """Another launch file: Python, or roslaunch's XML.
+    """Includes another launch file, in Python or roslaunch's XML.
 
-    Its arguments and what it sets stay set after it, as in ROS 2; put it into a GroupAction to avoid that.
+    Arguments and configurations of the file remain set after it, as in ROS 2; use a GroupAction to restore them.
 
     Args:
-        launch_description_source: The file, as a source or a path.
+        launch_description_source: The launch file, as a source or a path.
         launch_arguments: Pairs of name and value (`{...}.items()`), or a mapping.
     """
 
@@ -104,19 +104,19 @@ class IncludeLaunchDescription(Action):
 
     @property
     def launch_description_source(self) -> LaunchDescriptionSource:
-        """The file."""
+        """Returns the source of the launch file."""
         return self._source
 
     @property
     def launch_arguments(self) -> tuple[tuple[SomeSubstitutionsType, SomeSubstitutionsType], ...]:
-        """Pairs of name and value."""
+        """Returns the pairs of argument name and value."""
         return self._arguments
 
     def describe(self) -> str:
         return f"IncludeLaunchDescription({self._source.location})"
 
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """Returns the description, if its path is known before the launch."""
+        """Returns the description if its path is known before the launch."""
         description = self._source.try_get_launch_description_without_context()
         return [] if description is None else [description]
 
@@ -134,11 +134,11 @@ class IncludeLaunchDescription(Action):
 
     @staticmethod
     def _check_required(description: LaunchDescription, given: set[str], path: str) -> None:
-        """Checks that arguments without a default have a value, before anything of the file is visited."""
+        """Checks that all arguments without a default have a value, before the file is visited."""
         for argument in description.get_launch_arguments():
             if argument.default_value is None and not argument.conditionally_included and argument.name not in given:
                 raise LaunchError(
-                    f"{path} needs the argument '{argument.name}' ({argument.description}), which is not given"
+                    f"{path} requires the argument '{argument.name}' ({argument.description}), which is not given"
                     f"{hint(argument.name, given)}; given: {listed(given)}; add it to launch_arguments"
                 )
 
@@ -148,6 +148,6 @@ def _check_declared(description: LaunchDescription, given: Iterable[str], path: 
     for name in given:
         if name not in declared:
             raise LaunchError(
-                f"{path} has no argument '{name}'{hint(name, declared)}; allowed: {listed(declared)}; correct the "
-                "name, or leave it out"
+                f"{path} has no argument '{name}'{hint(name, declared)}; allowed: {listed(declared)}; correct or "
+                "remove it"
             )

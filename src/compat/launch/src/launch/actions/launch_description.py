@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch description: what a launch file returns."""
+"""Launch description, the return value of a launch file."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from launch.core.utilities import normalize_to_list_of_entities
 
 
 class LaunchDescription(LaunchDescriptionEntity):
-    """Entities that are visited in order.
+    """Sequence of entities that are visited in order.
 
     Args:
-        initial_entities: The first of them.
-        deprecated_reason: Why the description should no longer be used; None if it should.
+        initial_entities: Initial entities.
+        deprecated_reason: Reason for the deprecation of the description; None if not deprecated.
 
     Attributes:
-        takes_only_declared: Whether an argument that it does not declare is a mistake.
+        takes_only_declared: Whether undeclared arguments are errors.
     """
 
     takes_only_declared = False
@@ -35,20 +35,20 @@ class LaunchDescription(LaunchDescriptionEntity):
 
     @property
     def entities(self) -> list[LaunchDescriptionEntity]:
-        """The entities."""
+        """Returns the entities."""
         return self._entities
 
     @property
     def deprecated_reason(self) -> str | None:
-        """Why the description should no longer be used."""
+        """Returns the reason for the deprecation of the description."""
         return self._deprecated_reason
 
     def add_entity(self, entity: LaunchDescriptionEntity) -> None:
-        """Adds an entity at the end."""
+        """Appends an entity."""
         self._entities.extend(normalize_to_list_of_entities(entity))
 
     def add_action(self, action: LaunchDescriptionEntity) -> None:
-        """Adds an action at the end."""
+        """Appends an action."""
         self.add_entity(action)
 
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
@@ -59,13 +59,13 @@ class LaunchDescription(LaunchDescriptionEntity):
         return list(self._entities)
 
     def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[DeclareLaunchArgument]:
-        """Returns the launch arguments of this description and of those it includes, as far as they are known.
+        """Returns the known launch arguments of this description and of included descriptions.
 
         Args:
-            conditional_inclusion: Whether this description itself is visited on a condition only.
+            conditional_inclusion: Whether this description is only visited on a condition.
 
         Returns:
-            One action a name; `conditionally_included` says whether it is visited on a condition only.
+            One action per name; its `conditionally_included` tells whether the action is only visited on a condition.
         """
         found: dict[str, DeclareLaunchArgument] = {}
         _collect(self._entities, conditional_inclusion, found)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a launch description comes from."""
+"""Base class of sources of launch descriptions."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from launch.substitutions.text import described
 
 
 class LaunchDescriptionSource:
-    """Base of sources.
+    """Source of a launch description.
 
     Args:
-        launch_description: The description, or None when it is read from a file.
+        launch_description: The description; None for a description that is read from a file.
         location: Path of the file.
     """
 
@@ -29,11 +29,11 @@ class LaunchDescriptionSource:
 
     @property
     def location(self) -> str:
-        """Path of the file; before it is known, how it is written."""
+        """Returns the path of the file; before it is known, a description of its substitutions."""
         return self._path if self._path is not None else described(self._location)
 
     def get_launch_description(self, context: LaunchContext) -> LaunchDescription:
-        """Returns the description; a file is read once.
+        """Returns the description; a file is read only once.
 
         Raises:
             LaunchError: The file cannot be read.
@@ -46,7 +46,7 @@ class LaunchDescriptionSource:
         return self._loaded
 
     def try_get_launch_description_without_context(self) -> LaunchDescription | None:
-        """Returns the description if its path is known before the launch, and None if it is not."""
+        """Returns the description if its path is known before the launch, otherwise None."""
         if self._description is not None:
             return self._description
         try:
@@ -56,4 +56,4 @@ class LaunchDescriptionSource:
 
     def load(self, path: str) -> LaunchDescription:
         """Reads the description from a file."""
-        raise NotImplementedError(f"{type(self).__name__} reads no files")
+        raise NotImplementedError(f"{type(self).__name__} does not read files")

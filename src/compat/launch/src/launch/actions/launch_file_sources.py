@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch files: Python with `generate_launch_description()`, and roslaunch's XML."""
+"""Sources of launch files in Python, with `generate_launch_description()`, and in roslaunch's XML."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ FUNCTION = "generate_launch_description"
 
 
 def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleType:
-    """Returns a Python launch file as a module.
+    """Imports a Python launch file as a module.
 
     Raises:
-        InvalidLaunchFileError: The file is not there, or raised something; names the file and line.
+        InvalidLaunchFileError: The file does not exist or raised an exception; the message contains file and line.
     """
     path = _existing(python_launch_file_path)
     name = f"python_launch_file_{re.sub(r'[^0-9A-Za-z_]', '_', path.name)}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise InvalidLaunchFileError(f"{path}: is no Python file; allowed: a name that ends in .py")
+        raise InvalidLaunchFileError(f"{path}: is not a Python file; allowed: a name that ends in .py")
     module = importlib.util.module_from_spec(spec)
     write_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)
     except LaunchError:
         raise
-    except Exception as error:  # a launch file is a program, which may raise anything
+    except Exception as error:  # a launch file may raise anything
         raise _failed(path, error) from error
     finally:
         sys.dont_write_bytecode = write_bytecode
@@ -47,7 +47,7 @@ def get_launch_description_from_python_launch_file(python_launch_file_path: str)
     """Returns the description of a Python launch file.
 
     Raises:
-        InvalidLaunchFileError: The file has no function that returns one.
+        InvalidLaunchFileError: The file has no function that returns a launch description.
     """
     path = Path(python_launch_file_path)
     module = load_python_launch_file_as_module(python_launch_file_path)
@@ -55,19 +55,17 @@ def get_launch_description_from_python_launch_file(python_launch_file_path: str)
     if not callable(function):
         functions = [name for name, value in vars(module).items() if callable(value)]
         raise InvalidLaunchFileError(
-            f"{path}: has no function {FUNCTION}(){hint(FUNCTION, functions)}; a launch file defines one that returns "
+            f"{path}: has no function {FUNCTION}(){hint(FUNCTION, functions)}; define this function, which returns "
             "a LaunchDescription"
         )
     try:
         description: Any = function()
     except LaunchError:
         raise
-    except Exception as error:  # as above
+    except Exception as error:  # a launch file may raise anything
         raise _failed(path, error) from error
     if not isinstance(description, LaunchDescription):
-        raise InvalidLaunchFileError(
-            f"{path}: {FUNCTION}() returned {description!r}; allowed: a LaunchDescription; return one"
-        )
+        raise InvalidLaunchFileError(f"{path}: {FUNCTION}() returned {description!r}; allowed: a LaunchDescription")
     return description
 
 
@@ -76,12 +74,12 @@ def _existing(path_text: str) -> Path:
     if path.is_file():
         return path
     beside = sorted(each.name for each in path.parent.iterdir()) if path.parent.is_dir() else []
-    there = f"in {path.parent} are: {', '.join(beside)}" if beside else f"there is no folder {path.parent}"
+    there = f"{path.parent} contains: {', '.join(beside)}" if beside else f"folder {path.parent} does not exist"
     raise InvalidLaunchFileError(f"{path}: there is no such file{hint(path.name, beside)}; {there}; correct the path")
 
 
 def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:
-    """Returns the error of a file that raised something, with the line of that file where it came from."""
+    """Returns the error of a launch file that raised an exception, with the line in the file."""
     where, traceback = str(path), error.__traceback__
     if isinstance(error, SyntaxError) and error.lineno is not None:
         where = f"{error.filename}:{error.lineno}"
@@ -95,10 +93,10 @@ def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:
 
 
 class _LaunchFile(LaunchDescriptionSource):
-    """Base of launch files.
+    """Base class of sources that read a launch file.
 
     Args:
-        launch_file_path: Its path.
+        launch_file_path: Path of the file.
     """
 
     def __init__(self, launch_file_path: Any) -> None:
@@ -106,10 +104,10 @@ class _LaunchFile(LaunchDescriptionSource):
 
 
 class PythonLaunchDescriptionSource(_LaunchFile):
-    """A Python launch file.
+    """Source of a Python launch file.
 
     Args:
-        launch_file_path: Its path.
+        launch_file_path: Path of the file.
     """
 
     def load(self, path: str) -> LaunchDescription:
@@ -117,10 +115,10 @@ class PythonLaunchDescriptionSource(_LaunchFile):
 
 
 class XMLLaunchDescriptionSource(_LaunchFile):
-    """An XML launch file of roslaunch.
+    """Source of an XML launch file of roslaunch.
 
     Args:
-        launch_file_path: Its path.
+        launch_file_path: Path of the file.
     """
 
     def load(self, path: str) -> LaunchDescription:
@@ -130,10 +128,10 @@ class XMLLaunchDescriptionSource(_LaunchFile):
 
 
 class AnyLaunchDescriptionSource(_LaunchFile):
-    """A launch file; the end of its name says of which kind.
+    """Source of a launch file whose format is given by the end of its name.
 
     Args:
-        launch_file_path: Its path.
+        launch_file_path: Path of the file.
     """
 
     def load(self, path: str) -> LaunchDescription:
@@ -147,7 +145,7 @@ def get_launch_description_from_any_launch_file(launch_file_path: str) -> Launch
     """Returns the description of a launch file.
 
     Raises:
-        InvalidLaunchFileError: The file is of no known kind.
+        InvalidLaunchFileError: The format of the file is unknown.
     """
     if launch_file_path.endswith(PYTHON_ENDINGS):
         return get_launch_description_from_python_launch_file(launch_file_path)
@@ -155,4 +153,4 @@ def get_launch_description_from_any_launch_file(launch_file_path: str) -> Launch
         return XMLLaunchDescriptionSource(launch_file_path).load(launch_file_path)
     _existing(launch_file_path)
     allowed = ", ".join((*PYTHON_ENDINGS, *XML_ENDINGS))
-    raise InvalidLaunchFileError(f"{launch_file_path}: is of no known kind; allowed: names that end in {allowed}")
+    raise InvalidLaunchFileError(f"{launch_file_path}: unknown format; allowed: names that end in {allowed}")

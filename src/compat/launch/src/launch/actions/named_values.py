@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bases of the actions that set or remove a named value of the launch: a configuration, an environment variable."""
+"""Base classes of actions that set or remove a named value, such as a configuration or an environment variable."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from launch.core.utilities import normalize_to_list_of_substitutions, perform_su
 
 
 class NamedValueAction(Action):
-    """Base of actions on a named value.
+    """Base class of actions on a named value.
 
     Args:
-        name: Its name.
+        name: Name of the value.
     """
 
     def __init__(self, name: SomeSubstitutionsType, **kwargs: Any) -> None:
@@ -27,20 +27,20 @@ class NamedValueAction(Action):
 
     @property
     def name(self) -> list[Substitution]:
-        """Its name."""
+        """Returns the name of the value."""
         return self._name
 
     @abstractmethod
     def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
-        """Returns the values it is one of, by name."""
+        """Returns the mapping that contains the value."""
 
 
 class SetNamedValue(NamedValueAction):
-    """Base of actions that set a value.
+    """Base class of actions that set a value.
 
     Args:
-        name: Its name.
-        value: Its value.
+        name: Name of the value.
+        value: New value.
     """
 
     def __init__(self, name: SomeSubstitutionsType, value: SomeSubstitutionsType, **kwargs: Any) -> None:
@@ -49,7 +49,7 @@ class SetNamedValue(NamedValueAction):
 
     @property
     def value(self) -> list[Substitution]:
-        """Its value."""
+        """Returns the new value."""
         return self._value
 
     def execute(self, context: LaunchContext) -> None:
@@ -58,7 +58,7 @@ class SetNamedValue(NamedValueAction):
 
 
 class UnsetNamedValue(NamedValueAction):
-    """Base of actions that remove a value, if it is there."""
+    """Base class of actions that remove a value, if set."""
 
     def execute(self, context: LaunchContext) -> None:
         self._values(context).pop(perform_substitutions(context, self._name), None)

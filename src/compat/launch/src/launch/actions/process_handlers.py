@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Event handlers for the start and the end of processes, and for the end of the launch."""
+"""Event handlers for starts and exits of processes, and for the shutdown of the launch."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ Reaction = SomeEntitiesType | Callable[[Any, LaunchContext], SomeEntitiesType | 
 
 
 class _Handler(BaseEventHandler):
-    """Visits entities, or what a function returns, at events of a class.
+    """Visits entities, or the result of a function, after events of a class.
 
     Args:
         event_class: Class of the events.
-        target: The action whose process is meant, or a function that says so of an action, or None for all.
-        reaction: The entities, or a function of event and context that returns them.
-        handle_once: Whether the handler ends with the first event.
+        target: Action of the process, or a function that returns whether an action matches; None for all processes.
+        reaction: Entities, or a function of event and context that returns entities.
+        handle_once: Whether the handler is removed after the first event.
     """
 
     def __init__(self, event_class: type[Event], target: Any, reaction: Reaction, handle_once: bool) -> None:
-        super().__init__(matcher=lambda event: isinstance(event, event_class) and self._is_meant(event))
+        super().__init__(matcher=lambda event: isinstance(event, event_class) and self._matches_target(event))
         self._handle_once = handle_once
         self._target = target
         self._function = reaction if callable(reaction) else None
         self._entities = [] if callable(reaction) else normalize_to_list_of_entities(reaction)
 
-    def _is_meant(self, event: Event) -> bool:
+    def _matches_target(self, event: Event) -> bool:
         if self._target is None or not isinstance(event, RunningProcessEvent):
             return True
         return bool(self._target(event.action)) if callable(self._target) else event.action is self._target
@@ -53,18 +53,18 @@ class _Handler(BaseEventHandler):
 def _check_target(target: Any, handler: str) -> None:
     if target is not None and not callable(target) and not hasattr(target, "process_request"):
         raise LaunchError(
-            f"{line_of_launch_file()}: {handler}: target_action is {target!r}; allowed: the ExecuteProcess or Node "
-            "itself, a function of an action, or nothing for all processes"
+            f"{line_of_launch_file()}: {handler}: target_action is {target!r}; allowed: an ExecuteProcess or Node "
+            "object, a function of an action, or None for all processes"
         )
 
 
 class OnProcessExit(_Handler):
-    """Reacts to the end of a process.
+    """Handles the exit of a process.
 
     Args:
-        target_action: Its action, or a function that says whether an action is meant; None for all.
-        on_exit: Entities, or a function of the ProcessExited event and the context that returns them.
-        handle_once: Whether only the first end counts.
+        target_action: Action of the process, or a function that returns whether an action matches; None for all.
+        on_exit: Entities, or a function of the ProcessExited event and the context that returns entities.
+        handle_once: Whether only the first exit is handled.
     """
 
     def __init__(self, *, target_action: Any = None, on_exit: Reaction, handle_once: bool = False) -> None:
@@ -73,12 +73,12 @@ class OnProcessExit(_Handler):
 
 
 class OnProcessStart(_Handler):
-    """Reacts to the start of a process.
+    """Handles the start of a process.
 
     Args:
-        target_action: Its action, or a function that says whether an action is meant; None for all.
-        on_start: Entities, or a function of the ProcessStarted event and the context that returns them.
-        handle_once: Whether only the first start counts.
+        target_action: Action of the process, or a function that returns whether an action matches; None for all.
+        on_start: Entities, or a function of the ProcessStarted event and the context that returns entities.
+        handle_once: Whether only the first start is handled.
     """
 
     def __init__(self, *, target_action: Any = None, on_start: Reaction, handle_once: bool = False) -> None:
@@ -87,11 +87,11 @@ class OnProcessStart(_Handler):
 
 
 class OnShutdown(_Handler):
-    """Reacts to the end of the launch, before the processes are stopped.
+    """Handles the shutdown of the launch, before the processes are stopped.
 
     Args:
-        on_shutdown: Entities, or a function of the Shutdown event and the context that returns them.
-        handle_once: Accepted; a launch ends once.
+        on_shutdown: Entities, or a function of the Shutdown event and the context that returns entities.
+        handle_once: Accepted without effect; a launch shuts down only once.
     """
 
     def __init__(self, *, on_shutdown: Reaction, handle_once: bool = False) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""XML launch files of roslaunch in a launch description: roslaunch reads them, their nodes start with the others."""
+"""XML launch files of roslaunch in launch descriptions; roslaunch reads the files, this package starts the nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from launch.core.process_request import ProcessRequest
 from launch.core.screen_log import get_logger
 
 NAMESPACE, REMAPPINGS = "ros_namespace", "ros_remaps"
-"""Launch configurations with the namespace that was pushed and the remappings that were set."""
+"""Launch configurations with the current namespace and the current remappings."""
 _READ_ERRORS = (
     roslaunch.core.RLException,
     roslaunch.xmlloader.XmlParseException,
@@ -35,16 +35,16 @@ _READ_ERRORS = (
 
 
 def describe_xml_file(path: str) -> LaunchDescription:
-    """Returns a description that declares the arguments of an XML launch file, and launches it.
+    """Returns a description that declares the arguments of an XML launch file and launches the file.
 
     Raises:
-        LaunchError: It is no launch file.
+        LaunchError: The file is not a valid launch file.
     """
     try:
         known: dict[str, tuple[str | None, str | None]] = roslaunch.arg_dump.get_args([path])
     except _READ_ERRORS as error:
         raise LaunchError(f"{path}: {error}") from error
-    # A default may be an expression of roslaunch, which only roslaunch evaluates: it is left to it.
+    # Only roslaunch can evaluate expressions in defaults, so defaults are not evaluated here.
     arguments = [_XmlArgument(name, description=doc, xml_default=default) for name, (doc, default) in known.items()]
     description = LaunchDescription([*arguments, XmlLaunchFile(path, tuple(known))])
     description.takes_only_declared = True
@@ -52,12 +52,12 @@ def describe_xml_file(path: str) -> LaunchDescription:
 
 
 class _XmlArgument(DeclareLaunchArgument):
-    """An argument of an XML launch file, whose default roslaunch puts in.
+    """Declares an argument of an XML launch file, whose default roslaunch evaluates.
 
     Args:
-        name: Its name.
-        description: What it is for.
-        xml_default: Its default as it is written; None for an argument that must be given.
+        name: Name of the argument.
+        description: Description of the argument.
+        xml_default: Default in the file; None for an argument that must be given.
     """
 
     def __init__(self, name: str, *, description: str | None, xml_default: str | None) -> None:
@@ -71,8 +71,8 @@ class XmlLaunchFile(Action):
     """Plans the parameters of an XML launch file and requests its nodes.
 
     Args:
-        path: The file.
-        argument_names: Its arguments; those that are launch configurations are given to it.
+        path: Path of the file.
+        argument_names: Names of its arguments, which get the values of launch configurations of the same name.
     """
 
     def __init__(self, path: str, argument_names: tuple[str, ...]) -> None:
@@ -95,8 +95,8 @@ class XmlLaunchFile(Action):
         for node in config.nodes:
             if node.machine_name:
                 raise LaunchError(
-                    f"node '{node.name}' is for machine '{node.machine_name}'; allowed: nodes of this computer; start "
-                    "it there with roslaunch"
+                    f"node '{node.name}' is for machine '{node.machine_name}'; allowed: nodes of this computer; use "
+                    "roslaunch to start it on the other machine"
                 )
             full_name = f"{node.namespace}{node.name}"
             request = ProcessRequest(None, full_name.lstrip("/"), [], node_name=full_name, roslaunch_node=node)
@@ -104,7 +104,13 @@ class XmlLaunchFile(Action):
         return []
 
     def _load(self, given: Mapping[str, str], namespace: str | None, remappings: Any) -> Any:
-        """Returns roslaunch's configuration of the file, read as if another one included it in a namespace."""
+        """Reads the file with roslaunch, as included in a namespace with remappings.
+
+        Args:
+            given: Values of arguments, by name.
+            namespace: Namespace of the file; None for the root namespace.
+            remappings: Pairs of old and new name.
+        """
         arguments = "".join(f"<arg name={quoteattr(name)} value={quoteattr(given[name])}/>" for name in given)
         remaps = "".join(f"<remap from={quoteattr(old)} to={quoteattr(new)}/>" for old, new in remappings)
         group = f"<group ns={quoteattr(namespace)}>" if namespace and namespace != "/" else "<group>"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What launch descriptions are made of, and the context they are visited in."""
+"""Elements of launch descriptions, and the context of their visit."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action: something to do when a description is launched, perhaps on a condition."""
+"""Action, an entity that is executed when a description is launched, optionally on a condition."""
 
 from __future__ import annotations
 
@@ -12,31 +12,29 @@ from launch.core.launch_description_entity import LaunchDescriptionEntity
 
 
 class Action(LaunchDescriptionEntity):
-    """Base of actions.
+    """Base class of actions.
 
     Args:
-        condition: Decides whether the action is carried out; None for always.
+        condition: Condition of the execution; None to execute always.
 
     Attributes:
-        where: File and line that made it.
+        where: File and line of the launch file that created the action.
     """
 
     def __init__(self, *, condition: Condition | None = None) -> None:
         self.where = line_of_launch_file()
         if condition is not None:
             what = f"{self.where}: {type(self).__name__}: condition"
-            require_type(
-                condition, Condition, what, "a condition of launch.conditions; write IfCondition(...) around it"
-            )
+            require_type(condition, Condition, what, "a condition of launch.conditions, such as IfCondition(...)")
         self._condition = condition
 
     @property
     def condition(self) -> Condition | None:
-        """What decides whether the action is carried out."""
+        """Returns the condition of the execution."""
         return self._condition
 
     def visit(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
-        """Carries the action out unless its condition says no; an error gets the line of the launch file."""
+        """Executes the action if its condition holds; errors get the line of the launch file."""
         try:
             if self._condition is not None and not self._condition.evaluate(context):
                 return None
@@ -44,16 +42,16 @@ class Action(LaunchDescriptionEntity):
         except LaunchError as error:
             error.where = error.where or self.where
             raise
-        except Exception as error:  # a launch file is a program, whose functions may raise anything
+        except Exception as error:  # functions of a launch file may raise anything
             raise located_error(self.describe(), error, self.where) from error
 
     def execute(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
-        """Does it; returns entities to visit next."""
+        """Executes the action; returns the entities to visit next."""
         del context
         return None
 
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """Returns the entities inside, as far as they are known before the launch."""
+        """Returns the contained entities that are known before the launch."""
         return []
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:

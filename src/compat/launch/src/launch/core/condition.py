@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Condition: decides, while launching, whether an action is carried out."""
+"""Condition, which decides during the launch whether an action is executed."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from launch.core.launch_context import LaunchContext
 
 
 class Condition:
-    """A predicate over the launch context; without one it is false.
+    """Predicate over the launch context; false without a predicate.
 
     Args:
-        predicate: Called with the context; returns the truth.
+        predicate: Function that is called with the context and returns whether the condition holds.
     """
 
     def __init__(self, *, predicate: Callable[[LaunchContext], bool] | None = None) -> None:
@@ -23,5 +23,5 @@ class Condition:
         return f"{type(self).__name__}()"
 
     def evaluate(self, context: LaunchContext) -> bool:
-        """Returns the truth in a context."""
+        """Returns whether the condition holds in a context."""
         return self._predicate is not None and self._predicate(context)

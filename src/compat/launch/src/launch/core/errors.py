@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors of launch descriptions: each says where, what was found, what was allowed and what is probably meant."""
+"""Errors of launch descriptions, with location, invalid value, allowed values and a probable correction."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NoReturn
 
 PACKAGES_OF_LAUNCH = ("launch", "launch_ros", "importlib")
-"""Frames of these are skipped when the line of a launch file is looked for."""
+"""Packages whose stack frames are skipped in the search for the line of a launch file."""
 
 
 class LaunchError(RuntimeError):
-    """A launch description that cannot be carried out.
+    """A launch description cannot be executed.
 
     Args:
-        message: What was found, what was allowed and what to do.
+        message: Invalid value, allowed values and the action to take.
 
     Attributes:
-        where: File and line of the action concerned; empty as long as nobody knows it.
+        where: File and line of the action; empty if unknown.
     """
 
     def __init__(self, message: str) -> None:
@@ -27,7 +27,7 @@ class LaunchError(RuntimeError):
         self.where = ""
 
     def __str__(self) -> str:
-        message = Exception.__str__(self)  # that of KeyError puts quotes around it
+        message = Exception.__str__(self)  # KeyError's version would add quotes
         return f"{self.where}: {message}" if self.where else message
 
 
@@ -40,23 +40,23 @@ class InvalidConditionExpressionError(LaunchError):
 
 
 class InvalidLaunchFileError(LaunchError):
-    """A file holds no launch description."""
+    """A file is not a valid launch file."""
 
 
 class PackageNotFoundError(LaunchError, KeyError):
-    """No ROS package has this name. It is a KeyError too, as in `ament_index_python`."""
+    """No ROS package has the name; a KeyError for compatibility with `ament_index_python`."""
 
     __str__ = LaunchError.__str__
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Returns, after a semicolon, a question with the known name that is most like `name`; empty when none is."""
+    """Returns a question with the most similar known name, after a semicolon; empty without a similar name."""
     near = difflib.get_close_matches(name, list(known), n=1)
     return f"; did you mean '{near[0]}'" if near else ""
 
 
 def listed(names: Iterable[str]) -> str:
-    """Returns names in order, for a message; `none` when there are none."""
+    """Returns sorted names for a message; `none` without names."""
     return ", ".join(sorted(names)) or "none"
 
 
@@ -65,19 +65,19 @@ def require_type(value: object, kind: type, what: str, allowed: str) -> None:
 
     Args:
         value: The argument.
-        kind: The type it must have.
-        what: What it is, for the message.
-        allowed: What is allowed, and what to do.
+        kind: Required type.
+        what: Description of the argument for the message.
+        allowed: Allowed values, and the action to take.
 
     Raises:
-        TypeError: It has another type.
+        TypeError: The argument has another type.
     """
     if not isinstance(value, kind):
         raise TypeError(f"{what} is {value!r}; allowed: {allowed}")
 
 
 def line_of_launch_file() -> str:
-    """Returns file and line of the innermost caller outside of this package: the launch file."""
+    """Returns file and line of the innermost caller outside of this package, which is in the launch file."""
     frame = sys._getframe(1)
     while frame.f_back is not None:
         if frame.f_globals.get("__name__", "").partition(".")[0] not in PACKAGES_OF_LAUNCH:
@@ -86,29 +86,29 @@ def line_of_launch_file() -> str:
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
 
 
-def refusal_of(module: str, not_offered: Mapping[str, str]) -> Callable[[str], NoReturn]:
-    """Returns the `__getattr__` of a module that refuses public names of ROS 2 which it does not offer.
+def unsupported_names(module: str, alternatives: Mapping[str, str]) -> Callable[[str], NoReturn]:
+    """Returns a module's `__getattr__` that raises LaunchError for unsupported public names of ROS 2.
 
     Args:
-        module: Its name.
-        not_offered: What to do instead, by name.
+        module: Name of the module.
+        alternatives: Alternatives by unsupported name.
     """
 
-    def refuse(name: str) -> NoReturn:
-        if name in not_offered:
-            raise LaunchError(f"{line_of_launch_file()}: {module}.{name} is not offered: {not_offered[name]}")
+    def raise_if_unsupported(name: str) -> NoReturn:
+        if name in alternatives:
+            raise LaunchError(f"{line_of_launch_file()}: {module}.{name} is not supported: {alternatives[name]}")
         raise AttributeError(f"module '{module}' has no attribute '{name}'")
 
-    return refuse
+    return raise_if_unsupported
 
 
 def located_error(what: str, error: Exception, where: str) -> LaunchError:
-    """Returns the error of a launch file's own code, with the line of that code.
+    """Returns an error of a launch file's own code, with the line of the code.
 
     Args:
-        what: What was being done.
-        error: What the code raised.
-        where: File and line, when the error itself comes from this package.
+        what: Description of the failed step.
+        error: Exception of the code.
+        where: File and line for an exception that was raised in this package.
     """
     traceback = error.__traceback__
     while traceback is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Event handler: what is visited when an event of a kind happens."""
+"""Event handler, which determines the entities to visit after an event."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from launch.events.event import Event
 
 
 class BaseEventHandler:
-    """Base of event handlers; entities read the event as `context.locals.event`.
+    """Base class of event handlers; entities read the event as `context.locals.event`.
 
     Args:
-        matcher: Whether an event is one of those to handle.
-        handle_once: Whether the handler ends with the first such event.
+        matcher: Function that returns whether the handler applies to an event.
+        handle_once: Whether the handler is removed after the first event.
     """
 
     def __init__(self, *, matcher: Callable[[Event], bool], handle_once: bool = False) -> None:
@@ -25,30 +25,30 @@ class BaseEventHandler:
 
     @property
     def handle_once(self) -> bool:
-        """Whether the handler ends with the first event."""
+        """Returns whether the handler is removed after the first event."""
         return self._handle_once
 
     def matches(self, event: Event) -> bool:
-        """Returns whether an event is one of those to handle."""
+        """Returns whether the handler applies to an event."""
         return self._matcher(event)
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
-        """Returns the entities to visit because of an event."""
+        """Returns the entities to visit after an event."""
         context.extend_locals({"event": event})
         return None
 
     def described_entities(self) -> SomeEntitiesType | None:
-        """Returns the entities that are known before an event happens."""
+        """Returns the entities that are known before any event."""
         return None
 
 
 class EventHandler(BaseEventHandler):
-    """Visits the same entities at each event.
+    """Event handler that visits the same entities after each event.
 
     Args:
-        matcher: Whether an event is one of those to handle.
-        entities: What is visited then.
-        handle_once: Whether the handler ends with the first such event.
+        matcher: Function that returns whether the handler applies to an event.
+        entities: Entities to visit.
+        handle_once: Whether the handler is removed after the first event.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class EventHandler(BaseEventHandler):
 
     @property
     def entities(self) -> SomeEntitiesType | None:
-        """What is visited."""
+        """Returns the entities to visit."""
         return self._entities
 
     def described_entities(self) -> SomeEntitiesType | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch context: the configurations, environment, event handlers and requests while a description is launched."""
+"""Launch context, with configurations, environment, event handlers and requests of a running launch."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from launch.events.event import Event
 
 
 class _Substitution(Protocol):
-    """What the context needs of a substitution."""
+    """Interface of a substitution."""
 
     def perform(self, context: LaunchContext) -> str:
-        """Returns its text."""
+        """Returns the text of the substitution."""
 
 
 class _EventHandler(Protocol):
-    """What the context needs of an event handler."""
+    """Interface of an event handler."""
 
     def matches(self, event: Event) -> bool:
-        """Returns whether an event concerns it."""
+        """Returns whether the handler applies to an event."""
 
 
 class _Locals:
-    """Values by attribute, read only."""
+    """Read-only access to values by attribute."""
 
     def __init__(self, values: dict[str, Any]) -> None:
         object.__setattr__(self, "_values", values)
@@ -38,7 +38,7 @@ class _Locals:
     def __getattr__(self, key: str) -> Any:
         values = object.__getattribute__(self, "_values")
         if key not in values:
-            raise AttributeError(f"context.locals has no '{key}'; there are: {listed(values)}")
+            raise AttributeError(f"context.locals has no '{key}'; known: {listed(values)}")
         return values[key]
 
     def __setattr__(self, key: str, value: Any) -> None:
@@ -46,18 +46,18 @@ class _Locals:
 
 
 class LaunchContext:
-    """Everything that entities read and write when they are visited.
+    """State of a launch that entities read and write during their visit.
 
     Args:
         argv: Arguments of the launch.
-        noninteractive: Whether nobody sits at the terminal.
+        noninteractive: Whether the launch runs without a user at a terminal.
 
     Attributes:
         parameters: Parameters to set before the next processes start.
         requests: Processes to start, in order.
-        new_timers: TimerActions to run from now.
-        declared_arguments: Names of the launch arguments visited so far.
-        read_configurations: Names of the launch configurations that were read so far.
+        new_timers: TimerActions to start.
+        declared_arguments: Names of the visited launch arguments.
+        read_configurations: Names of the launch configurations that were read.
     """
 
     def __init__(self, *, argv: Iterable[str] | None = None, noninteractive: bool = False) -> None:
@@ -80,24 +80,24 @@ class LaunchContext:
 
     @property
     def launch_configurations(self) -> dict[str, Any]:
-        """Values of the launch configurations of this scope, by name."""
+        """Returns the launch configurations of the current scope, by name."""
         return self._configurations
 
     def read_configuration(self, name: str) -> Any:
-        """Returns the value of a launch configuration; None when it is not set."""
+        """Returns the value of a launch configuration; None if not set."""
         self.read_configurations.add(name)
         return self._configurations.get(name)
 
     def push_launch_configurations(self) -> None:
-        """Begins a scope: what is set in it is forgotten at its end."""
+        """Starts a scope of launch configurations, whose changes end with the scope."""
         self._configuration_stack.append(self._configurations)
         self._configurations = dict(self._configurations)
 
     def pop_launch_configurations(self) -> None:
-        """Ends a scope.
+        """Ends a scope of launch configurations.
 
         Raises:
-            LaunchError: None was begun.
+            LaunchError: No scope was started.
         """
         if not self._configuration_stack:
             raise LaunchError("PopLaunchConfigurations without a PushLaunchConfigurations before it")
@@ -105,7 +105,7 @@ class LaunchContext:
 
     @contextmanager
     def scope(self, configurations: dict[str, Any]) -> Iterator[None]:
-        """Puts a scope back that has ended, for what was written in it and happens later."""
+        """Temporarily restores the launch configurations of an ended scope, for later actions of this scope."""
         now, self._configurations = self._configurations, configurations
         try:
             yield
@@ -114,47 +114,47 @@ class LaunchContext:
 
     @property
     def environment(self) -> MutableMapping[str, str]:
-        """The environment of the launch, which processes get."""
+        """Returns the environment variables of the launch, which processes inherit."""
         return os.environ
 
     def push_environment(self) -> None:
-        """Begins a scope of the environment."""
+        """Starts a scope of the environment."""
         self._environment_stack.append(dict(os.environ))
 
     def pop_environment(self) -> None:
         """Ends a scope of the environment.
 
         Raises:
-            LaunchError: None was begun.
+            LaunchError: No scope was started.
         """
         if not self._environment_stack:
             raise LaunchError("PopEnvironment without a PushEnvironment before it")
         _set_environment(self._environment_stack.pop())
 
     def reset_environment(self) -> None:
-        """Puts the environment back that the launch began with."""
+        """Restores the initial environment of the launch."""
         _set_environment(self._first_environment)
 
     @property
     def locals(self) -> Any:
-        """Values by attribute, among them `event` in an event handler."""
+        """Returns local values as attributes; in an event handler, `event` is the event."""
         return _Locals(self.get_locals_as_dict())
 
     def get_locals_as_dict(self) -> dict[str, Any]:
-        """Returns the values of `locals` by name."""
+        """Returns the local and global values by name."""
         return {**self._globals, **self._locals}
 
     def extend_locals(self, extensions: dict[str, Any]) -> None:
-        """Sets values of `locals`, until the end of an event's handling."""
+        """Adds local values, which end with the handling of an event."""
         self._locals = {**self._locals, **extensions}
 
     def extend_globals(self, extensions: dict[str, Any]) -> None:
-        """Sets values of `locals` for good."""
+        """Adds global values, which never end."""
         self._globals = {**self._globals, **extensions}
 
     @contextmanager
     def local_scope(self) -> Iterator[None]:
-        """Forgets what is set in `locals` inside."""
+        """Discards local values that are added inside the context."""
         before = self._locals
         try:
             yield
@@ -162,14 +162,19 @@ class LaunchContext:
             self._locals = before
 
     def register_event_handler(self, event_handler: _EventHandler, append: bool = False) -> None:
-        """Adds an event handler, before the others or after them; it keeps the configurations of this scope."""
+        """Adds an event handler, which keeps the configurations of the current scope.
+
+        Args:
+            event_handler: The handler.
+            append: Whether the handler is called after the other handlers instead of before them.
+        """
         self._handlers.insert(len(self._handlers) if append else 0, (event_handler, self._configurations))
 
     def unregister_event_handler(self, event_handler: _EventHandler) -> None:
         """Removes an event handler.
 
         Raises:
-            LaunchError: It was not registered.
+            LaunchError: The handler is not registered.
         """
         kept = [entry for entry in self._handlers if entry[0] is not event_handler]
         if len(kept) == len(self._handlers):
@@ -177,19 +182,19 @@ class LaunchContext:
         self._handlers = kept
 
     def handlers_of(self, event: Event) -> list[tuple[Any, dict[str, Any]]]:
-        """Returns the event handlers that an event concerns, each with the configurations of its scope."""
+        """Returns the handlers of an event, with the configurations of their scopes."""
         return [entry for entry in self._handlers if entry[0].matches(event)]
 
     def would_handle_event(self, event: Event) -> bool:
-        """Returns whether an event concerns any handler."""
+        """Returns whether an event has a handler."""
         return bool(self.handlers_of(event))
 
     def emit_event_sync(self, event: Event) -> None:
-        """Lets an event happen, after those that are waiting."""
+        """Adds an event to the queue."""
         self._events.append(event)
 
     def next_event(self) -> Event | None:
-        """Takes the event that waits longest; None when there is none."""
+        """Removes and returns the oldest event of the queue; None for an empty queue."""
         return self._events.popleft() if self._events else None
 
     def perform_substitution(self, substitution: _Substitution) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a launch description is made of: actions, and descriptions themselves."""
+"""Base class of launch description entities: actions and descriptions."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from launch.core.launch_context import LaunchContext
 
 
 class LaunchDescriptionEntity:
-    """Something that is visited, in order, when a description is launched."""
+    """Entity that is visited, in order, when a description is launched."""
 
     def visit(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
-        """Does what the entity is for; returns the entities to visit next, before those that follow this one."""
+        """Executes the entity; returns the entities to visit next, before the following entities."""
         del context
         return None
 
@@ -21,9 +21,9 @@ class LaunchDescriptionEntity:
         return type(self).__name__
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """Returns the entities inside that are visited whatever the configuration is."""
+        """Returns the contained entities that are visited in any configuration."""
         return []
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
-        """Returns what decides about entities inside, and those entities."""
+        """Returns the contained entities that are visited on a condition, with descriptions of the conditions."""
         return []

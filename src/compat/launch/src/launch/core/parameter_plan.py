@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters that a launch sets: collected while the description is visited, set before its processes start."""
+"""Parameters of a launch, collected while the description is visited and set before its processes start."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 from launch.core.errors import LaunchError
 
 ParameterValue = bool | int | float | str | list[Any] | dict[str, Any]
-ALLOWED = "true or false, an integer, a number, a text, a list, or names with such values"
+ALLOWED = "a bool, an integer, a number, a text, a list, or a mapping of names to such values"
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedParameter:
-    """A value and who gave it.
+    """Value of a parameter and its origin.
 
     Attributes:
-        value: The value; no mapping with entries.
-        owner: Node or file that gave it.
-        shared: Whether nodes read it that others give it to.
+        value: Value of the parameter; never a mapping with entries.
+        owner: Node or file that sets the parameter.
+        shared: Whether several nodes read the parameter.
     """
 
     value: ParameterValue
@@ -29,7 +29,7 @@ class PlannedParameter:
 
 
 class ParameterPlan:
-    """Values by full name; names with values below them are not in it, only those values are."""
+    """Planned parameters by full name; a mapping is stored as one parameter per entry."""
 
     def __init__(self) -> None:
         self._planned: dict[str, PlannedParameter] = {}
@@ -37,48 +37,48 @@ class ParameterPlan:
         self._cleared: list[str] = []
 
     def clear(self, name: str) -> None:
-        """Plans that a parameter and all below it are removed, before others are set."""
+        """Plans to remove a parameter and all parameters below, before others are set."""
         self._cleared.append(name)
 
-    def take_cleared(self) -> list[str]:
-        """Returns what is to be removed since the last call."""
+    def pop_cleared(self) -> list[str]:
+        """Returns the names that were planned for removal since the last call."""
         cleared, self._cleared = self._cleared, []
         return cleared
 
     def set(self, name: str, value: object, owner: str, *, shared: bool = False) -> None:
-        """Plans a parameter; a mapping plans one for each of its entries.
+        """Plans a parameter; a mapping is planned as one parameter per entry.
 
         Args:
-            name: Full name, from `/`.
-            value: A value of the parameter server.
-            owner: Node or file that gives it.
-            shared: Whether nodes read it that others give it to: then all must give the same.
+            name: Full name, starting with `/`.
+            value: Value of a type of the parameter server.
+            owner: Node or file that sets the parameter.
+            shared: Whether several nodes read the parameter, so that all owners must set the same value.
 
         Raises:
-            LaunchError: The value is none of the parameter server's, or differs from another owner's shared one.
+            LaunchError: The type of the value is not supported, or another owner has set a different shared value.
         """
         for leaf, each in _leaves(name, value, owner):
             known = self._planned.get(leaf)
             is_shared = shared or (known is not None and known.shared)
             if is_shared and known is not None and known.owner != owner and known.value != each:
                 raise LaunchError(
-                    f"parameter {leaf}: {known.owner} gives {_short(known.value)}, {owner} gives {_short(each)}; "
-                    "allowed: one value, because all nodes of this namespace read it there; give both nodes the same, "
-                    "or put them in different namespaces"
+                    f"parameter {leaf}: {known.owner} sets {_short(known.value)}, {owner} sets {_short(each)}; "
+                    "allowed: a single value, because all nodes of this namespace read it; set the same value for both "
+                    "nodes, or move them to different namespaces"
                 )
             self._planned[leaf] = self._changed[leaf] = PlannedParameter(each, owner, is_shared)
 
     def has_changed(self) -> bool:
-        """Whether anything is to be set or removed."""
+        """Returns whether any parameter is to be set or removed."""
         return bool(self._changed or self._cleared)
 
-    def take_changed(self) -> dict[str, ParameterValue]:
-        """Returns what was planned since the last call, by full name."""
+    def pop_changed(self) -> dict[str, ParameterValue]:
+        """Returns the parameters planned since the last call, by full name."""
         changed, self._changed = self._changed, {}
         return {name: entry.value for name, entry in changed.items()}
 
     def get(self, name: str) -> ParameterValue | None:
-        """Returns a planned value, or the mapping of those below a name; None when there is none."""
+        """Returns a planned value, or the mapping of the values below a name; None if nothing is planned."""
         if name in self._planned:
             return self._planned[name].value
         below = {
@@ -89,12 +89,12 @@ class ParameterPlan:
         return nested(below) if below else None
 
     def values(self) -> dict[str, ParameterValue]:
-        """Returns everything planned, by full name."""
+        """Returns all planned values, by full name."""
         return {name: entry.value for name, entry in self._planned.items()}
 
 
 def nested(flat: Mapping[str, ParameterValue]) -> dict[str, Any]:
-    """Returns names with slashes as mappings in each other."""
+    """Converts names with slashes to nested mappings."""
     tree: dict[str, Any] = {}
     for name, value in flat.items():
         *folders, leaf = name.strip("/").split("/")
@@ -114,7 +114,7 @@ def _leaves(name: str, value: object, owner: str) -> Iterator[tuple[str, Paramet
 
 
 def _checked(name: str, value: object, owner: str) -> ParameterValue:
-    """Returns a value in the types of the parameter server."""
+    """Converts a value to the types of the parameter server."""
     match value:
         case bool() | int() | float() | str():
             return value
@@ -123,7 +123,7 @@ def _checked(name: str, value: object, owner: str) -> ParameterValue:
         case Mapping():
             return {str(key): _checked(f"{name}/{key}", each, owner) for key, each in value.items()}
     found = "no value" if value is None else f"{value!r} of type {type(value).__name__}"
-    raise LaunchError(f"{owner}: parameter {name}: got {found}; allowed: {ALLOWED}; correct it, or leave it out")
+    raise LaunchError(f"{owner}: parameter {name}: got {found}; allowed: {ALLOWED}; correct or remove it")
 
 
 def _short(value: ParameterValue) -> str:
@@ -132,4 +132,4 @@ def _short(value: ParameterValue) -> str:
 
 
 Lookup = Callable[[str], Any]
-"""Returns the value of a parameter by its full name, planned or on the parameter server; None when there is none."""
+"""Function that returns the planned or current value of a parameter by full name; None if not set."""

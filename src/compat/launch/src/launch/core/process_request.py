@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is to be started: collected while the description is visited, started when its parameters are set."""
+"""Processes to start, collected while the description is visited and started after its parameters are set."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from launch.core.parameter_plan import Lookup
 
 @dataclass(eq=False)
 class ProcessRequest:
-    """A process to start.
+    """Request to start a process.
 
     Attributes:
-        action: The action that asked for it; None for a node of an XML launch file.
-        name: Name in messages; a node's full name without the first slash.
+        action: Action that requested the process; None for a node of an XML launch file.
+        name: Name in messages; for a node, its full name without the leading slash.
         command: Program and arguments.
-        environment: Variables of its environment.
-        cwd: Its working folder; empty for that of the launch.
-        on_screen: Whether its output goes to the screen instead of a log file.
-        respawn: Whether it starts again after its end.
-        respawn_delay_s: Time until then [s].
-        respawn_max_retries: How often, at most; -1 for no limit.
-        sigterm_timeout_s: Time after SIGINT until SIGTERM [s].
-        sigkill_timeout_s: Time after SIGTERM until SIGKILL [s].
-        node_name: Full name of the node; empty for a process that is no node, or names itself.
-        is_node: Whether it understands `__log:=`.
-        prepare: Called before parameters are set, with a look-up of parameters; may plan more of them.
-        roslaunch_node: roslaunch's own node, of an XML launch file; then only `name` and `node_name` count.
+        environment: Environment variables.
+        cwd: Working folder; empty for the folder of the launch.
+        on_screen: Whether the output is printed on the screen instead of a log file.
+        respawn: Whether the process restarts after its exit.
+        respawn_delay_s: Delay of the restart [s].
+        respawn_max_retries: Maximum number of restarts; -1 for no limit.
+        sigterm_timeout_s: Time from SIGINT to SIGTERM [s].
+        sigkill_timeout_s: Time from SIGTERM to SIGKILL [s].
+        node_name: Full name of the node; empty for a process that is not a node or sets its own name.
+        is_node: Whether the process supports `__log:=`.
+        prepare: Function that is called with a parameter lookup before the parameters are set, and may plan further
+            parameters.
+        roslaunch_node: Node object of roslaunch for a node of an XML launch file; only `name` and `node_name` apply.
     """
 
     action: Any

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the launch itself says, on the screen."""
+"""Log messages of the launch on the screen."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ ROOT = "launch"
 
 
 class _Screen(logging.Handler):
-    """Writes to what `sys.stdout` is at that moment: roslaunch and tests replace it."""
+    """Writes to the current `sys.stdout`, which roslaunch and tests replace."""
 
     def emit(self, record: logging.LogRecord) -> None:
         print(self.format(record), file=sys.stdout, flush=True)
 
 
 def get_logger(name: str | None = None) -> logging.Logger:
-    """Returns the logger of the launch, or one below it."""
+    """Returns the logger of the launch, or a child logger."""
     root = logging.getLogger(ROOT)
     if not root.handlers:
         handler = _Screen()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What may stand where entities are wanted: one, or several."""
+"""Type of one or several entities."""
 
 from __future__ import annotations
 

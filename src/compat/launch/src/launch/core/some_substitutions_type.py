@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What may stand where a text is wanted: a text, a substitution, or several of them that are joined."""
+"""Type of a text, a substitution, or a sequence of both that is concatenated."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitution: a text that is known only while a description is launched."""
+"""Substitution, a text that is only known during the launch."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from launch.core.launch_context import LaunchContext
 
 
 class Substitution:
-    """Base of everything that stands for a text and gets its value in a launch context."""
+    """Base class of substitutions, which are replaced by a text in a launch context."""
 
     def describe(self) -> str:
-        """Returns how the substitution is written, for listings of arguments and for messages."""
+        """Returns a description of the substitution for argument listings and messages."""
         return f"{type(self).__name__}()"
 
     def perform(self, context: LaunchContext) -> str:
         """Returns the text.
 
         Raises:
-            SubstitutionFailure: There is no value in this context.
+            SubstitutionFailure: The substitution has no value in this context.
         """
-        raise NotImplementedError(f"{type(self).__name__} does not say its value: define perform(context)")
+        raise NotImplementedError(f"{type(self).__name__} has no value; define perform(context)")
 
 
 class TextSubstitution(Substitution):
-    """A text.
+    """Constant text.
 
     Args:
         text: The text.
@@ -36,7 +36,7 @@ class TextSubstitution(Substitution):
 
     @property
     def text(self) -> str:
-        """The text."""
+        """Returns the text."""
         return self._text
 
     def describe(self) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns what users may write for a text, entities or a typed value into one form; public as `launch.utilities`."""
+"""Normalizes arguments of actions: texts, entities and typed values; public as `launch.utilities`."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TRUE_TEXTS, FALSE_TEXTS = ("true", "yes", "on", "1"), ("false", "no", "off", "0"
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType) -> list[Substitution]:
-    """Returns the substitutions whose joined texts a value stands for.
+    """Returns the substitutions whose concatenated texts are the value.
 
     Raises:
-        TypeError: Something is neither a text nor a substitution; names it and the line of the launch file.
+        TypeError: A part is neither a text nor a substitution; the message contains the line of the launch file.
     """
     if isinstance(subs, str | Substitution) or not isinstance(subs, Iterable):
         subs = [subs]
@@ -33,31 +33,31 @@ def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType) -> list[Subs
         else:
             raise TypeError(
                 f"{line_of_launch_file()}: got {each!r} of type {type(each).__name__}; allowed: a text or a "
-                f"substitution; write it as a text, '{each}'"
+                f"substitution, for example '{each}'"
             )
     return normalized
 
 
 def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) -> str:
-    """Returns the joined texts of substitutions."""
+    """Returns the concatenated texts of substitutions."""
     return "".join(context.perform_substitution(each) for each in subs)
 
 
 def perform_text(context: LaunchContext, value: SomeSubstitutionsType) -> str:
-    """Returns the text that a value stands for."""
+    """Returns the text of a value with substitutions."""
     return perform_substitutions(context, normalize_to_list_of_substitutions(value))
 
 
 def perform_boolean(context: LaunchContext, value: bool | SomeSubstitutionsType, what: str) -> bool:
-    """Returns the truth that a value stands for.
+    """Returns the bool of a value with substitutions.
 
     Args:
         context: Launch context.
-        value: A bool, or a text that says true or false.
-        what: What the value is, for the message.
+        value: A bool, or a text that is true or false.
+        what: Name of the value for the message.
 
     Raises:
-        LaunchError: The text is neither.
+        LaunchError: The text is neither true nor false.
     """
     if isinstance(value, bool):
         return value
@@ -70,15 +70,15 @@ def perform_boolean(context: LaunchContext, value: bool | SomeSubstitutionsType,
 
 
 def perform_number(context: LaunchContext, value: float | SomeSubstitutionsType, what: str) -> float:
-    """Returns the number that a value stands for.
+    """Returns the number of a value with substitutions.
 
     Args:
         context: Launch context.
-        value: A number, or its text.
-        what: What the value is, for the message.
+        value: A number, or a text with a number.
+        what: Name of the value for the message.
 
     Raises:
-        LaunchError: The text is no number.
+        LaunchError: The text is not a number.
     """
     if isinstance(value, int | float):
         return float(value)
@@ -90,10 +90,10 @@ def perform_number(context: LaunchContext, value: float | SomeSubstitutionsType,
 
 
 def normalize_to_list_of_entities(entities: SomeEntitiesType | None) -> list[LaunchDescriptionEntity]:
-    """Returns the entities of one entity, several, or none.
+    """Returns a list of one entity, several entities, or None.
 
     Raises:
-        TypeError: Something is no entity.
+        TypeError: An element is not an entity.
     """
     if entities is None:
         return []
@@ -104,18 +104,18 @@ def normalize_to_list_of_entities(entities: SomeEntitiesType | None) -> list[Lau
         if not isinstance(each, LaunchDescriptionEntity):
             raise TypeError(
                 f"{line_of_launch_file()}: got {each!r} of type {type(each).__name__}; allowed: actions and launch "
-                "descriptions; put the action itself there"
+                "descriptions"
             )
     return found
 
 
 def is_a(obj: object, entity_type: type) -> bool:
-    """Whether an object is an instance of a type."""
+    """Returns whether an object is an instance of a type."""
     return isinstance(obj, entity_type)
 
 
 def is_a_subclass(obj: object, entity_type: type) -> bool:
-    """Whether an object is an instance of a type, or a class derived from it."""
+    """Returns whether an object is an instance of a type, or a subclass."""
     return isinstance(obj, entity_type) or (isinstance(obj, type) and issubclass(obj, entity_type))
 
 
@@ -123,13 +123,13 @@ def ensure_argument_type(argument: Any, types: Any, argument_name: str, caller: 
     """Checks the type of an argument.
 
     Args:
-        argument: Value to check.
-        types: Type, or types of which the argument may have any.
-        argument_name: Name that the error gives.
-        caller: Name of the function that was called, for the error.
+        argument: The argument.
+        types: Allowed type or types.
+        argument_name: Name of the argument for the message.
+        caller: Name of the caller for the message.
 
     Raises:
-        TypeError: It is none of the given types.
+        TypeError: The argument has none of the allowed types.
     """
     allowed = types if isinstance(types, type) else tuple(types)
     if not isinstance(argument, allowed):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Events: the end of the launch, and a timer that is due; those of processes are in `launch.events.process`."""
+"""Events of the launch: shutdown and due timers; `launch.events.process` contains the events of processes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ __all__ = ["Shutdown", "TimerEvent", "matches_action", "process"]
 
 
 class Shutdown(Event):
-    """The launch is to end.
+    """Shuts the launch down.
 
     Args:
-        reason: Why, for the message.
-        due_to_sigint: Whether a user asked for it with Ctrl-C.
+        reason: Reason for the message.
+        due_to_sigint: Whether a user requested the shutdown with Ctrl-C.
         exit_code: Exit code of the launch.
     """
 
@@ -31,7 +31,7 @@ class TimerEvent(Event):
     """A timer is due.
 
     Args:
-        timer_action: The TimerAction.
+        timer_action: TimerAction of the timer.
     """
 
     def __init__(self, *, timer_action: Any) -> None:
@@ -39,5 +39,5 @@ class TimerEvent(Event):
 
 
 def matches_action(target_action: Any) -> Callable[[Any], bool]:
-    """Returns a matcher of processes: whether an action is `target_action`."""
+    """Returns a function that returns whether an action is `target_action`."""
     return lambda action: action is target_action

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Event: something that happened while a description runs."""
+"""Base class of events during a launch."""
 
 from __future__ import annotations
 
 
 class Event:
-    """Base of events; event handlers choose by the class."""
+    """Base class of events; event handlers select events by class."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Events of processes: started, ended, and what asks a process to end or sends it a signal."""
+"""Events of processes: start and exit, and requests to stop or signal a process."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ __all__ = [
 
 @dataclass(eq=False)
 class RunningProcessEvent(Event):
-    """Something happened to a process.
+    """Event of a process.
 
     Attributes:
-        action: The action that started it.
-        name: Its name in messages.
-        cmd: Its command.
-        pid: Its process id.
-        cwd: Its working folder; None for that of the launch.
-        env: Its environment.
+        action: Action that started the process.
+        name: Name of the process in messages.
+        cmd: Program and arguments.
+        pid: Process id.
+        cwd: Working folder; None for the folder of the launch.
+        env: Environment variables.
     """
 
     action: Any
@@ -41,31 +41,31 @@ class RunningProcessEvent(Event):
 
     @property
     def process_name(self) -> str:
-        """Name of the process."""
+        """Returns the name of the process."""
         return self.name
 
 
 @dataclass(eq=False)
 class ProcessStarted(RunningProcessEvent):
-    """A process has started, or started again."""
+    """A process has started or restarted."""
 
 
 @dataclass(eq=False)
 class ProcessExited(RunningProcessEvent):
-    """A process has ended by itself.
+    """A process has ended.
 
     Attributes:
-        returncode: Its exit code; minus the number of the signal that ended it.
+        returncode: Exit code; the negative signal number if a signal ended the process.
     """
 
     returncode: int = 0
 
 
 class ShutdownProcess(Event):
-    """Asks processes to end: SIGINT, and after the timeouts SIGTERM and SIGKILL.
+    """Stops processes with SIGINT, and after timeouts with SIGTERM and SIGKILL.
 
     Args:
-        process_matcher: Called with an action; returns whether its process is meant.
+        process_matcher: Function that returns whether the process of an action is selected.
     """
 
     def __init__(self, *, process_matcher: Callable[[Any], bool]) -> None:
@@ -77,7 +77,7 @@ class SignalProcess(Event):
 
     Args:
         signal_number: Number or name (`SIGUSR1`) of the signal.
-        process_matcher: Called with an action; returns whether its process is meant.
+        process_matcher: Function that returns whether the process of an action is selected.
     """
 
     def __init__(self, *, signal_number: str | int | signal.Signals, process_matcher: Callable[[Any], bool]) -> None:

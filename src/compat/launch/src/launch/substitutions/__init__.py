@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitutions: texts that are known only while a description is launched."""
+"""Substitutions, texts that are only known during the launch."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitutions that look at files or run programs."""
+"""Substitutions that read files or run programs."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ ON_STDERR = ("fail", "ignore", "warn", "capture")
 
 
 class PathJoinSubstitution(Substitution):
-    """Parts of a path, joined with slashes.
+    """Path of parts that are joined with slashes.
 
     Args:
-        substitutions: The parts; a part may be several, which are joined without a slash.
+        substitutions: Parts of the path; a part may be a sequence, which is concatenated.
     """
 
     def __init__(self, substitutions: Any) -> None:
@@ -35,7 +35,7 @@ class PathJoinSubstitution(Substitution):
 
     @property
     def substitutions(self) -> list[Substitution]:
-        """The parts."""
+        """Returns the parts of the path."""
         return [each for part in self._parts for each in part]
 
     def describe(self) -> str:
@@ -45,15 +45,15 @@ class PathJoinSubstitution(Substitution):
         return os.path.join(*(perform_substitutions(context, part) for part in self._parts))
 
     def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
-        """Returns the path with a further part, as `path / "config"`."""
+        """Returns the path with an additional part, as in `path / "config"`."""
         return PathJoinSubstitution([*self._parts, normalize_to_list_of_substitutions(part)])
 
 
 class FileContent(SubstitutionOfText):
-    """What a text file holds.
+    """Content of a text file.
 
     Args:
-        path: Its path.
+        path: Path of the file.
     """
 
     def __init__(self, path: SomeSubstitutionsType) -> None:
@@ -72,7 +72,7 @@ class FindExecutable(SubstitutionOfText):
     """Path of a program.
 
     Args:
-        name: Its name, looked for in PATH.
+        name: Name of the program in PATH.
     """
 
     label = "FindExec"
@@ -85,18 +85,18 @@ class FindExecutable(SubstitutionOfText):
         found = shutil.which(name, path=path)
         if found is None:
             raise SubstitutionFailure(
-                f"program '{name}' was not found; looked in the folders of PATH: {path}; install it, or source the "
-                "workspace that has it"
+                f"program '{name}' is not found; searched the folders in PATH: {path}; install it, or source the "
+                "workspace that contains it"
             )
         return found
 
 
 class Command(SubstitutionOfText):
-    """What a program prints.
+    """Output of a program.
 
     Args:
-        command: Program and arguments, split as a shell does.
-        on_stderr: What to do when it prints errors: fail, ignore, warn, or capture (take them too).
+        command: Program and arguments, split as in a shell.
+        on_stderr: Handling of error output: fail, ignore, warn, or capture (add to the output).
     """
 
     command = SubstitutionOfText.text
@@ -128,7 +128,7 @@ class Command(SubstitutionOfText):
             )
         if result.stderr and on_stderr == "fail":
             raise SubstitutionFailure(
-                f"Command: '{command}' printed errors: {result.stderr.strip()}; mend them, or give Command "
+                f"Command: '{command}' printed errors: {result.stderr.strip()}; correct them, or give Command "
                 "on_stderr='warn'"
             )
         if result.stderr and on_stderr == "warn":
@@ -137,11 +137,11 @@ class Command(SubstitutionOfText):
 
 
 class PythonExpression(SubstitutionOfText):
-    """The value of a Python expression, as a text.
+    """Value of a Python expression, as a text.
 
     Args:
-        expression: The expression; texts that come from substitutions need quotes around them.
-        python_modules: Modules that it may use; the names of `math` need no prefix.
+        expression: The expression; texts from substitutions need quotes.
+        python_modules: Modules for the expression; names of `math` need no prefix.
     """
 
     label = "PythonExpr"
@@ -161,5 +161,5 @@ class PythonExpression(SubstitutionOfText):
             return str(eval(expression, {}, names))  # noqa: S307  # the launch file is a program of the user's
         except Exception as error:  # an expression may raise anything
             raise SubstitutionFailure(
-                f"PythonExpression: {expression!r}: {type(error).__name__}: {error}; write quotes around texts"
+                f"PythonExpression: {expression!r}: {type(error).__name__}: {error}; add quotes around texts"
             ) from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitutions that are `true` or `false`, and the choice between two texts."""
+"""Substitutions with the values `true` or `false`, and a selection between two texts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _text(truth: bool) -> str:
 
 
 class _OfTexts(Substitution):
-    """Base: a truth about several texts."""
+    """Base class of logical functions of several texts."""
 
     def __init__(self, *values: SomeSubstitutionsType) -> None:
         self._values = [normalize_to_list_of_substitutions(each) for each in values]
@@ -32,27 +32,27 @@ class _OfTexts(Substitution):
         return f"{type(self).__name__}({', '.join(described(each) for each in self._values)})"
 
     def perform(self, context: LaunchContext) -> str:
-        return _text(self._holds(context))
+        return _text(self._is_true(context))
 
-    def _truths(self, context: LaunchContext) -> list[bool]:
+    def _booleans(self, context: LaunchContext) -> list[bool]:
         return [perform_boolean(context, each, f"an operand of {self.describe()}") for each in self._values]
 
-    def _holds(self, context: LaunchContext) -> bool:
+    def _is_true(self, context: LaunchContext) -> bool:
         raise NotImplementedError
 
 
 class EqualsSubstitution(_OfTexts):
-    """Whether two texts are equal, or say the same truth or number.
+    """Returns whether two texts are equal, or have the same bool or number.
 
     Args:
-        left: One text.
-        right: The other.
+        left: First text.
+        right: Second text.
     """
 
     def __init__(self, left: object, right: object) -> None:
         super().__init__(_as_text(left), _as_text(right))
 
-    def _holds(self, context: LaunchContext) -> bool:
+    def _is_true(self, context: LaunchContext) -> bool:
         left, right = (perform_substitutions(context, each) for each in self._values)
         if left == right:
             return True
@@ -71,14 +71,14 @@ def _as_text(value: object) -> SomeSubstitutionsType:
 
 
 class NotEqualsSubstitution(EqualsSubstitution):
-    """Whether two texts differ."""
+    """Returns whether two texts differ."""
 
-    def _holds(self, context: LaunchContext) -> bool:
-        return not super()._holds(context)
+    def _is_true(self, context: LaunchContext) -> bool:
+        return not super()._is_true(context)
 
 
 class NotSubstitution(_OfTexts):
-    """Whether a text says false.
+    """Returns whether a text is false.
 
     Args:
         value: The text.
@@ -87,30 +87,30 @@ class NotSubstitution(_OfTexts):
     def __init__(self, value: SomeSubstitutionsType) -> None:
         super().__init__(value)
 
-    def _holds(self, context: LaunchContext) -> bool:
-        return not self._truths(context)[0]
+    def _is_true(self, context: LaunchContext) -> bool:
+        return not self._booleans(context)[0]
 
 
 class AllSubstitution(_OfTexts):
-    """Whether all texts say true."""
+    """Returns whether all texts are true."""
 
-    def _holds(self, context: LaunchContext) -> bool:
-        return all(self._truths(context))
+    def _is_true(self, context: LaunchContext) -> bool:
+        return all(self._booleans(context))
 
 
 class AnySubstitution(_OfTexts):
-    """Whether a text says true."""
+    """Returns whether any text is true."""
 
-    def _holds(self, context: LaunchContext) -> bool:
-        return any(self._truths(context))
+    def _is_true(self, context: LaunchContext) -> bool:
+        return any(self._booleans(context))
 
 
 class _OfTwoTexts(_OfTexts):
-    """Base: a truth about two texts.
+    """Base class of logical functions of two texts.
 
     Args:
-        left: One text.
-        right: The other.
+        left: First text.
+        right: Second text.
     """
 
     def __init__(self, left: SomeSubstitutionsType, right: SomeSubstitutionsType) -> None:
@@ -118,20 +118,20 @@ class _OfTwoTexts(_OfTexts):
 
 
 class AndSubstitution(_OfTwoTexts, AllSubstitution):
-    """Whether both texts say true."""
+    """Returns whether both texts are true."""
 
 
 class OrSubstitution(_OfTwoTexts, AnySubstitution):
-    """Whether one of two texts says true."""
+    """Returns whether any of two texts is true."""
 
 
 class IfElseSubstitution(Substitution):
-    """One text or another.
+    """Selects one of two texts.
 
     Args:
-        condition: A text that says true or false.
-        if_value: Taken when it says true.
-        else_value: Taken when it says false.
+        condition: Text that is true or false.
+        if_value: Text for a true condition.
+        else_value: Text for a false condition.
     """
 
     def __init__(

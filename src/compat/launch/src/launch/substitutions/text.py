@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A text as it is, values of the context, and names that are different each time."""
+"""Substitutions of constant texts, values of the context, and unique names."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ __all__ = [
 
 
 def described(subs: Iterable[Substitution]) -> str:
-    """Returns how substitutions are written."""
+    """Returns a description of substitutions."""
     return " + ".join(each.describe() for each in subs)
 
 
 class SubstitutionOfText(Substitution):
-    """Base of substitutions whose value follows from one text.
+    """Base class of substitutions whose value depends on one text.
 
     Attributes:
-        label: What `describe` calls the substitution; its class where empty.
+        label: Name of the substitution in `describe`; empty for the name of the class.
 
     Args:
-        text: The text, which may be substitutions itself.
+        text: The text, with substitutions.
     """
 
     label: ClassVar[str] = ""
@@ -49,7 +49,7 @@ class SubstitutionOfText(Substitution):
 
     @property
     def text(self) -> list[Substitution]:
-        """The text; a subclass may offer it under the name it has in ROS 2."""
+        """Returns the text; subclasses provide it under the name in ROS 2."""
         return self._text
 
     def describe(self) -> str:
@@ -59,16 +59,16 @@ class SubstitutionOfText(Substitution):
         return self._value(context, perform_substitutions(context, self._text))
 
     def _value(self, context: LaunchContext, text: str) -> str:
-        """Returns the value that follows from the text in a launch context."""
-        raise NotImplementedError(f"{type(self).__name__} does not say its value: define _value(context, text)")
+        """Returns the value for a text in a launch context."""
+        raise NotImplementedError(f"{type(self).__name__} has no value; define _value(context, text)")
 
 
 class LaunchConfiguration(SubstitutionOfText):
-    """The value of a launch configuration, which a launch argument is too.
+    """Value of a launch configuration or launch argument.
 
     Args:
-        variable_name: Its name.
-        default: Value when it is not set.
+        variable_name: Name of the configuration.
+        default: Value of a configuration that is not set.
     """
 
     label = "LaunchConfig"
@@ -92,17 +92,17 @@ class LaunchConfiguration(SubstitutionOfText):
             return perform_substitutions(context, self._default)
         known = context.launch_configurations
         raise SubstitutionFailure(
-            f"launch configuration '{name}' is not set{hint(name, known)}; set here: {listed(known)}; declare it "
+            f"launch configuration '{name}' is not set{hint(name, known)}; set: {listed(known)}; declare it "
             f"before with DeclareLaunchArgument('{name}', default_value=...), or give LaunchConfiguration a default"
         )
 
 
 class EnvironmentVariable(SubstitutionOfText):
-    """The value of an environment variable.
+    """Value of an environment variable.
 
     Args:
-        name: Its name.
-        default_value: Value when it is not set.
+        name: Name of the variable.
+        default_value: Value of a variable that is not set.
     """
 
     label = "EnvVar"
@@ -123,11 +123,11 @@ class EnvironmentVariable(SubstitutionOfText):
 
 
 class LocalSubstitution(Substitution):
-    """A value of the context's `locals`, such as `event.returncode` in an event handler.
+    """Value in the context's `locals`, such as `event.returncode` in an event handler.
 
     Args:
-        expression: Attributes, joined by dots.
-        description: How it is shown.
+        expression: Attributes, separated by dots.
+        description: Text that represents the substitution in messages.
     """
 
     def __init__(self, expression: str, description: str | None = None) -> None:
@@ -148,24 +148,24 @@ class LocalSubstitution(Substitution):
 
 
 class ThisLaunchFile(Substitution):
-    """Path of the launch file that is being visited."""
+    """Path of the current launch file."""
 
     def perform(self, context: LaunchContext) -> str:
         path = context.get_locals_as_dict().get("current_launch_file_path")
         if path is None:
-            raise SubstitutionFailure("ThisLaunchFile: this description comes from no file; use a path instead")
+            raise SubstitutionFailure("ThisLaunchFile: this description does not come from a file; use a path instead")
         return str(path)
 
 
 class ThisLaunchFileDir(ThisLaunchFile):
-    """Folder of the launch file that is being visited."""
+    """Folder of the current launch file."""
 
     def perform(self, context: LaunchContext) -> str:
         return os.path.dirname(super().perform(context))
 
 
 class AnonName(SubstitutionOfText):
-    """A name that no other process has; the same for the same base name within a launch.
+    """Unique name of a process; the same base name gives the same name within a launch.
 
     Args:
         name: Base name.
