@@ -127,7 +127,7 @@ def test_two_descriptions_in_one_namespace_are_an_error_that_names_both_nodes(co
 
 def test_all_nodes_have_one_clock(context: LaunchContext) -> None:
     assert planned(context, Node(**PROGRAM, name="a", parameters=[{"use_sim_time": True}])) == {"/use_sim_time": True}
-    with pytest.raises(RuntimeError, match="parameter /use_sim_time: node /a gives True"):
+    with pytest.raises(RuntimeError, match="parameter /use_sim_time: node /a sets True"):
         planned(context, SetUseSimTime(False))
 
 
@@ -160,12 +160,12 @@ def test_ros_arguments_of_ros_2_are_understood(context: LaunchContext) -> None:
     ("options", "message"),
     [
         ({"parameters": [{"a": None}]}, "node /n: parameter /n/a: got no value"),
-        ({"parameters": [{"a": LaunchConfiguration("broken")}]}, "no YAML.*ParameterValue"),
+        ({"parameters": [{"a": LaunchConfiguration("broken")}]}, "not valid YAML.*ParameterValue"),
         ({"parameters": [{"a": ParameterValue(LaunchConfiguration("rate"), value_type=int)}]}, "allowed: int"),
         ({"parameters": ["/no/such/file.yaml"]}, "parameter file /no/such/file.yaml cannot be read"),
         ({"parameters": {"a": 1}}, "a list of dicts and files"),
         ({"name": "left/n"}, r"node name 'left/n'.*namespace=\.\.\."),
-        ({"namespace": "2nd"}, "namespace '/2nd' is not allowed"),
+        ({"namespace": "2nd"}, "namespace '/2nd' is invalid"),
         ({"ros_arguments": ["--remapp", "a:=b"]}, "did you mean '--remap'"),
     ],
 )
@@ -175,5 +175,5 @@ def test_what_cannot_be_set_is_refused_with_the_line(context: LaunchContext, opt
 
 
 def test_what_ros_1_has_not_is_refused_with_what_to_do() -> None:
-    with pytest.raises(RuntimeError, match="ComposableNodeContainer is not offered: ROS 1 has no components"):
+    with pytest.raises(RuntimeError, match="ComposableNodeContainer is not supported: ROS 1 has no components"):
         from launch_ros.actions import ComposableNodeContainer  # noqa: F401

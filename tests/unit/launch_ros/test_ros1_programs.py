@@ -210,7 +210,9 @@ def test_simulated_hardware_starts_the_simulation_which_is_the_clock_of_all_node
 
 def test_simulated_hardware_stands_alone_in_the_namespace_of_the_simulation() -> None:
     arm, hand = tag("arm", SIMULATED, joint("a")), tag("hand", MOCK, joint("b"))
-    with pytest.raises(RuntimeError, match="name='hand'> is mock_components.* beside simulated hardware; allowed: all"):
+    with pytest.raises(
+        RuntimeError, match="name='hand'> is mock_components.* beside simulated hardware; allowed: only"
+    ):
         prepared(f"<robot name='r'>{arm}{hand}</robot>")
     with pytest.raises(RuntimeError, match="in namespace /left has simulated hardware; allowed: namespace /"):
         prepared(f"<robot name='r'>{arm}</robot>", namespace="left")
@@ -250,7 +252,7 @@ def test_without_a_description_the_joints_are_those_of_the_controllers() -> None
         (f"<robot>{tag('arm', '')}</robot>", "name='arm'> has no <hardware><plugin>"),
         (f"<robot>{tag('arm', MOCK, joint('a', 'torque'))}</robot>", r"'a' has the command interfaces \['torque'\]"),
         (f"<robot>{tag('arm', MOCK, joint('a', initial='x'))}</robot>", "initial value of joint 'a' is 'x'"),
-        ("", "the hardware is not known"),
+        ("", "the hardware is unknown"),
     ],
 )
 def test_hardware_that_cannot_be_understood_is_refused(urdf: str, message: str) -> None:

@@ -111,8 +111,8 @@ def test_the_log_names_each_class_that_ros_1_lacks(source: Path, capsys: pytest.
     started_with(source)
     lines = capsys.readouterr().out
     for name in ("rviz_visual_tools/Gui", "nav2_rviz_plugins/ParticleCloud", "nav2_rviz_plugins/GoalTool", "x/View"):
-        assert f"({name}) left out" in lines
-    assert "displays Trajectory, MotionPlanning of MoveIt's plugin: replaced" in lines
+        assert f"({name}) is left out" in lines
+    assert "displays Trajectory, MotionPlanning of MoveIt's plugin are replaced" in lines
 
 
 @pytest.mark.parametrize("option", ["-d", "--display-config"])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS nodes in Python launch descriptions, for ROS 1: actions, substitutions, parameter_descriptions."""
+"""ROS nodes in Python launch descriptions, for ROS 1: actions, substitutions and parameter descriptions."""

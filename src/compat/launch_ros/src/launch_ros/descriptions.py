@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Descriptions of parameters under their other public name."""
+"""Alternative public module of parameter descriptions."""
 
 from __future__ import annotations
 

@@ -11,14 +11,14 @@ _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 
 
 def join(base: str | None, name: str | None) -> str:
-    """Returns the absolute namespace of a name that is relative to a base, or absolute itself.
+    """Returns the absolute namespace of a name.
 
     Args:
-        base: The namespace around it; None for the root.
-        name: The namespace; None for the base itself.
+        base: Enclosing namespace; None for the root namespace.
+        name: Namespace, absolute or relative to the base; None for the base itself.
 
     Raises:
-        LaunchError: A part is no ROS name.
+        LaunchError: A part is not a valid ROS name.
     """
     joined = name if name and name.startswith("/") else f"{base or ''}/{name or ''}"
     parts = [part for part in joined.split("/") if part]
@@ -28,22 +28,22 @@ def join(base: str | None, name: str | None) -> str:
 
 
 def check_node_name(name: str) -> str:
-    """Returns the name of a node.
+    """Checks and returns the name of a node.
 
     Raises:
-        LaunchError: It is no ROS name, or has a namespace in it.
+        LaunchError: The name is not a valid ROS name, or contains a namespace.
     """
     _check(name, "node name", name)
     return name
 
 
 def full_name(namespace: str, name: str) -> str:
-    """Returns the full name of something in an absolute namespace."""
+    """Returns the full name of a name in an absolute namespace."""
     return f"{namespace.rstrip('/')}/{name}"
 
 
 def name_from(executable: str) -> str:
-    """Returns a node name made of a program's name."""
+    """Returns a node name derived from the name of a program."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", executable.removesuffix(".py"))
     return name if _WORD.match(name) else f"node_{name}"
 
@@ -51,6 +51,6 @@ def name_from(executable: str) -> str:
 def _check(part: str, what: str, whole: str) -> None:
     if not _WORD.match(part):
         raise LaunchError(
-            f"{what} '{whole}' is not allowed; allowed: letters, digits and underscores, a letter first"
+            f"{what} '{whole}' is invalid; allowed: letters, digits and underscores, starting with a letter"
             f"{'; give the namespace as namespace=...' if what == 'node name' and '/' in whole else ''}"
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the parameters of a node go on ROS 1: to the node, and what nodes share also to its namespace."""
+"""Parameters of nodes on ROS 1, which are set for the node and, if shared, also in its namespace."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from launch_ros.namespaces import full_name
 from launch_ros.parameter_descriptions import Parameter, ParameterFile, evaluate_value, read_yaml_mapping
 
 SECTION = "ros__parameters"
-"""Key of ROS 2's parameter files below which the parameters of a node are."""
+"""Key of the parameters of a node in parameter files of ROS 2."""
 DESCRIPTION = "robot_description"
 DESCRIPTION_PARTS = ("", "_semantic", "_kinematics", "_planning")
-"""Endings of the names that RViz, robot_state_publisher and MoveIt's clients look for in their namespace."""
+"""Suffixes of the parameters that RViz, robot_state_publisher and MoveIt's clients read in their namespace."""
 CLOCK = "use_sim_time"
-"""All nodes of a ROS 1 master have one clock; this parameter is in the root namespace."""
+"""Parameter of the clock in the root namespace, which is shared by all nodes of a ROS 1 master."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterSource:
-    """An entry of a node's `parameters`.
+    """Entry of a node's `parameters`.
 
     Attributes:
-        content: What it holds.
-        path: The file it came from; None for a dict.
+        content: Parameters of the entry.
+        path: File of the parameters; None for a dict.
     """
 
     content: Mapping[str, Any]
@@ -40,22 +40,22 @@ class ParameterSource:
 
     @property
     def has_sections(self) -> bool:
-        """Whether it is written for ROS 2, with a section for each node."""
+        """Returns whether the entry is a file for ROS 2 with sections of nodes."""
         return self.path is not None and any(True for _ in sections(self.content))
 
 
 def evaluate_sources(context: LaunchContext, parameters: Any) -> list[ParameterSource]:
-    """Returns what the entries of `parameters` hold, in order.
+    """Returns the contents of the entries of `parameters`, in order.
 
     Args:
         context: Launch context.
-        parameters: Dicts, paths of YAML files, ParameterFile, Parameter.
+        parameters: Dicts, paths of YAML files, ParameterFile or Parameter objects.
 
     Raises:
-        LaunchError: An entry is none of these, or a file cannot be read.
+        LaunchError: An entry has another type, or a file cannot be read.
     """
     if isinstance(parameters, str | Mapping):
-        raise LaunchError(f"parameters is {type(parameters).__name__}; allowed: a list of dicts and files; write [...]")
+        raise LaunchError(f"parameters is {type(parameters).__name__}; allowed: a list of dicts and files, [...]")
     return [_evaluated(context, entry) for entry in parameters]
 
 
@@ -74,7 +74,12 @@ def _evaluated(context: LaunchContext, entry: Any) -> ParameterSource:
 
 
 def sections(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Returns the sections of a parameter file of ROS 2: pattern of the node's full name, and its parameters."""
+    """Yields the sections of a ROS 2 parameter file: pattern of the node's full name, and parameters.
+
+    Args:
+        content: Content of the file.
+        prefix: Pattern of the enclosing namespace.
+    """
     for key, value in content.items():
         if not isinstance(value, Mapping):
             continue
@@ -85,10 +90,10 @@ def sections(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
 
 
 def parameters_of_node(sources: Iterable[ParameterSource], node: str) -> dict[str, Any]:
-    """Returns the parameters that entries give to a node; later entries win, of a file its exact section.
+    """Returns the parameters of a node; later entries override earlier entries, and exact sections override patterns.
 
     Args:
-        sources: The entries.
+        sources: Entries of `parameters`.
         node: Full name of the node.
     """
     merged: dict[str, Any] = {}
@@ -107,7 +112,7 @@ def _matches(pattern: str, node: str) -> bool:
 
 
 def nest_dots(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a mapping in which names with dots, ROS 2's separator, are mappings in each other."""
+    """Converts names with dots, ROS 2's separator, to nested mappings."""
     nested: dict[str, Any] = {}
     for name, value in content.items():
         parts = str(name).replace("/", ".").strip(".").split(".")
@@ -119,7 +124,7 @@ def nest_dots(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def merge(target: dict[str, Any], values: Mapping[str, Any]) -> None:
-    """Puts values into a mapping; mappings in it are merged, other values are replaced."""
+    """Adds values to a mapping; nested mappings are merged, other values are replaced."""
     for name, value in values.items():
         if isinstance(value, Mapping) and isinstance(target.get(name), dict):
             merge(target[name], value)
@@ -128,10 +133,10 @@ def merge(target: dict[str, Any], values: Mapping[str, Any]) -> None:
 
 
 def description_names(parameters: Mapping[str, Any]) -> set[str]:
-    """Returns the names among a node's parameters that other nodes look for in its namespace.
+    """Returns the names of a node's parameters that other nodes read in its namespace.
 
-    They are `robot_description`, `robot_description_semantic`, `..._kinematics` and `..._planning`; a robot description
-    under another name, which its text shows, has the same endings.
+    These are `robot_description`, `robot_description_semantic`, `..._kinematics` and `..._planning`. A robot
+    description under another name is detected by its text, and its name has the same suffixes.
     """
     bases = {DESCRIPTION}
     for name, value in parameters.items():
@@ -144,13 +149,13 @@ def plan_parameters(plan: ParameterPlan, namespace: str, name: str, parameters: 
     """Plans the parameters of a node.
 
     Args:
-        plan: Where they are planned.
+        plan: Plan of the parameters.
         namespace: Absolute namespace of the node.
-        name: Its name in it.
-        parameters: Its parameters.
+        name: Name of the node in its namespace.
+        parameters: Parameters of the node.
 
     Raises:
-        LaunchError: Another node of the namespace gives another description of the robot, or another clock.
+        LaunchError: Another node of the namespace has set another robot description or clock.
     """
     node = full_name(namespace, name)
     owner = f"node {node}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of nodes as a launch file writes them: values with a type, single parameters, YAML files."""
+"""Parameters of nodes in launch files: typed values, single parameters, and YAML files."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SCALARS = (bool, int, float, str)
 
 
 class ParameterValue:
-    """A value with a type.
+    """Value with a type.
 
     Args:
-        value: The value, or substitutions for it.
-        value_type: bool, int, float, str, or a list of one of these (`List[float]`); None for what YAML makes of it.
+        value: The value, or its substitutions.
+        value_type: bool, int, float, str, or a list of one of these (`List[float]`); None for the type given by YAML.
     """
 
     def __init__(self, value: Any, *, value_type: Any = None) -> None:
@@ -34,30 +34,30 @@ class ParameterValue:
 
     @property
     def value(self) -> Any:
-        """The value as it was given."""
+        """Returns the value, or its substitutions."""
         return self._value
 
     @property
     def value_type(self) -> Any:
-        """Its type."""
+        """Returns the type."""
         return self._type
 
     def evaluate(self, context: LaunchContext) -> Any:
         """Returns the value.
 
         Raises:
-            LaunchError: It is not of the type.
+            LaunchError: The value does not have the type.
         """
         return evaluate_value(context, self._value, self._type, "the ParameterValue")
 
 
 class Parameter:
-    """A parameter.
+    """Single parameter.
 
     Args:
-        name: Its name.
-        value: Its value, or substitutions for it.
-        value_type: As of ParameterValue.
+        name: Name of the parameter.
+        value: Value of the parameter, or its substitutions.
+        value_type: Type of the value, see `ParameterValue`.
     """
 
     def __init__(self, name: SomeSubstitutionsType, value: Any, *, value_type: Any = None) -> None:
@@ -65,16 +65,16 @@ class Parameter:
         self._value = ParameterValue(value, value_type=value_type)
 
     def evaluate(self, context: LaunchContext) -> tuple[str, Any]:
-        """Returns name and value."""
+        """Returns the name and the value."""
         return perform_text(context, self._name), self._value.evaluate(context)
 
 
 class ParameterFile:
-    """A YAML file with parameters.
+    """YAML file with parameters.
 
     Args:
-        param_file: Its path.
-        allow_substs: Whether it holds substitutions of XML launch files, `$(var name)`; refused.
+        param_file: Path of the file.
+        allow_substs: Whether the file contains substitutions of XML launch files, `$(var name)`; not supported.
     """
 
     def __init__(self, param_file: Any, *, allow_substs: Any = False) -> None:
@@ -85,26 +85,26 @@ class ParameterFile:
         """Returns the path.
 
         Raises:
-            LaunchError: Substitutions in the file are asked for.
+            LaunchError: Substitutions in the file are requested.
         """
         path = Path(perform_text(context, self._file))
         if perform_boolean(context, self._allow_substs, "allow_substs of ParameterFile"):
             raise LaunchError(
-                f"{path}: allow_substs=True is not offered; allowed: False; put the values that vary into a dict after "
+                f"{path}: allow_substs=True is not supported; allowed: False; move the varying values to a dict after "
                 "the file"
             )
         return path
 
     def evaluate(self, context: LaunchContext) -> Mapping[str, Any]:
-        """Returns what the file holds."""
+        """Returns the parameters in the file."""
         return read_yaml_mapping(self.path(context))
 
 
 def read_yaml_mapping(path: Path) -> dict[str, Any]:
-    """Returns the mapping that a YAML file holds.
+    """Returns the mapping in a YAML file.
 
     Raises:
-        LaunchError: It cannot be read, or holds something else; names the line.
+        LaunchError: The file cannot be read or is not a mapping; the message contains the line.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -112,46 +112,46 @@ def read_yaml_mapping(path: Path) -> dict[str, Any]:
         beside = [str(each) for each in path.parent.iterdir()] if path.parent.is_dir() else []
         raise LaunchError(f"parameter file {path} cannot be read: {error}{hint(str(path), beside)}") from None
     except yaml.YAMLError as error:
-        raise LaunchError(f"parameter file {path} is no YAML: {error}") from None
+        raise LaunchError(f"parameter file {path} is not valid YAML: {error}") from None
     if content is None:
         return {}
     if not isinstance(content, dict):
-        raise LaunchError(f"parameter file {path} holds {content!r}; allowed: names with values, 'name: value'")
+        raise LaunchError(f"parameter file {path} contains {content!r}; allowed: names with values, 'name: value'")
     return content
 
 
 def evaluate_value(context: LaunchContext, value: Any, value_type: Any, what: str) -> Any:
     """Returns a value with its substitutions performed.
 
-    Texts that come from substitutions are read as YAML, as in ROS 2, unless `value_type` is str; a text that is XML
-    stays a text. Several substitutions and texts in a list are one text; to write a list, put each into a list.
+    Texts from substitutions are parsed as YAML, as in ROS 2, unless `value_type` is str; XML remains a text. A list of
+    texts and substitutions is a single text; a list value needs a nested list per element.
 
     Args:
         context: Launch context.
-        value: The value as it is written.
-        value_type: As of ParameterValue.
-        what: What the value is, for messages.
+        value: Value in the launch file.
+        value_type: Type of the value, see `ParameterValue`.
+        what: Name of the value for messages.
 
     Raises:
-        LaunchError: It is no value of a parameter, or not of the type.
+        LaunchError: The value is not a valid parameter value, or does not have the type.
     """
     if isinstance(value, ParameterValue):
         return value.evaluate(context)
-    if isinstance(value, Substitution) or _is_one_text(value):
-        return _typed(perform_text(context, value), value_type, what)
+    if isinstance(value, Substitution) or _is_single_text(value):
+        return _parsed(perform_text(context, value), value_type, what)
     if isinstance(value, Mapping):
         return {
             perform_text(context, key): evaluate_value(context, inner, None, f"{what}/{key}")
             for key, inner in value.items()
         }
     if isinstance(value, list | tuple):
-        return _evenly([evaluate_value(context, inner, None, what) for inner in value])
+        return _with_uniform_type([evaluate_value(context, inner, None, what) for inner in value])
     if value_type is not None and isinstance(value, str):
-        return _typed(value, value_type, what)
-    return _coerced(value, value_type, what) if value_type is not None else value
+        return _parsed(value, value_type, what)
+    return _converted(value, value_type, what) if value_type is not None else value
 
 
-def _is_one_text(value: Any) -> bool:
+def _is_single_text(value: Any) -> bool:
     if not isinstance(value, list | tuple) or not value:
         return False
     return all(isinstance(each, str | Substitution) for each in value) and any(
@@ -159,46 +159,46 @@ def _is_one_text(value: Any) -> bool:
     )
 
 
-def _evenly(values: list[Any]) -> list[Any]:
-    """Makes integers among other numbers numbers, so that a list has one type."""
+def _with_uniform_type(values: list[Any]) -> list[Any]:
+    """Converts integers in a list with floating-point numbers, so that the list has one type."""
     numbers = all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
     if numbers and any(isinstance(each, float) for each in values):
         return [float(each) for each in values]
     return values
 
 
-def _typed(text: str, value_type: Any, what: str) -> Any:
-    """Returns the value that a text is written for."""
+def _parsed(text: str, value_type: Any, what: str) -> Any:
+    """Parses a text as a value."""
     if value_type is str:
         return text
-    if value_type is None and text.lstrip().startswith("<"):  # XML; as YAML it might be anything
+    if value_type is None and text.lstrip().startswith("<"):  # YAML could misinterpret XML
         return text
     try:
         value = yaml.safe_load(text) if text else ""
     except yaml.YAMLError as error:
         raise LaunchError(
-            f"{what} is {_short(text)}, which is no YAML: {error}; to keep it a text, write "
+            f"{what} is {_short(text)}, which is not valid YAML: {error}; to keep the text, write "
             "ParameterValue(..., value_type=str)"
         ) from None
     if value_type is not None:
-        return _coerced(value, value_type, what)
+        return _converted(value, value_type, what)
     if value is None or isinstance(value, Mapping):
         raise LaunchError(
-            f"{what} is {_short(text)}, which YAML reads as {'nothing' if value is None else 'names with values'}; to "
-            "keep it a text, write ParameterValue(..., value_type=str)"
+            f"{what} is {_short(text)}, which YAML parses as {'nothing' if value is None else 'a mapping'}; to keep "
+            "the text, write ParameterValue(..., value_type=str)"
         )
     return value
 
 
-def _coerced(value: Any, value_type: Any, what: str) -> Any:
-    """Returns a value in a type."""
+def _converted(value: Any, value_type: Any, what: str) -> Any:
+    """Converts a value to a type."""
     if typing.get_origin(value_type) is list:
         inner = typing.get_args(value_type)[0]
         if isinstance(value, list | tuple):
-            return [_coerced(each, inner, what) for each in value]
+            return [_converted(each, inner, what) for each in value]
     elif value_type not in SCALARS:
         names = ", ".join(each.__name__ for each in SCALARS)
-        raise LaunchError(f"{what}: value_type is {value_type!r}; allowed: {names}, and lists of them (List[float])")
+        raise LaunchError(f"{what}: value_type is {value_type!r}; allowed: {names}, and lists of these (List[float])")
     elif value_type is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     elif isinstance(value, value_type) and not (value_type is int and isinstance(value, bool)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Programs of ROS 2 that have another name or other arguments on ROS 1: one table, and the functions it names."""
+"""Converts programs of ROS 2 with other names or arguments on ROS 1, with one table of conversion functions."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from launch_ros.rviz_config import ros1_config_file
 
 @dataclass(frozen=True)
 class LatePlan:
-    """What is known of a node only once all parameters of the launch are.
+    """Properties of a node that depend on all parameters of the launch.
 
     Attributes:
-        parameters: More parameters of the node.
-        namespace_parameters: More parameters of its namespace.
-        simulated_time: Whether the node is the clock of all others.
-        program: Package and program to start in place of its own; None for its own.
+        parameters: Additional parameters of the node.
+        namespace_parameters: Additional parameters of the node's namespace.
+        simulated_time: Whether the node provides the clock of all nodes.
+        program: Package and program that replace the node's program; None to keep it.
     """
 
     parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -37,18 +37,18 @@ class LatePlan:
 
 @dataclass(frozen=True)
 class NodePlan:
-    """A node as it is to be started.
+    """Node to start.
 
     Attributes:
-        package: Package of its program.
-        executable: Its program.
-        namespace: Its namespace, from `/`.
-        name: Its name; empty when the program names itself.
+        package: Package of the program.
+        executable: Name of the program.
+        namespace: Absolute namespace of the node.
+        name: Name of the node; empty if the program sets its own name.
         arguments: Arguments of the program.
-        sources: Entries of its `parameters`.
-        namespace_parameters: Parameters for its namespace, besides what it is given.
-        late: Called before the parameters are set, with a look-up of parameters.
-        companions: Nodes to start besides it.
+        sources: Entries of the node's `parameters`.
+        namespace_parameters: Additional parameters of the node's namespace.
+        late_plan: Function that is called with a parameter lookup before the parameters are set.
+        companions: Additional nodes to start.
     """
 
     package: str
@@ -58,22 +58,22 @@ class NodePlan:
     arguments: tuple[str, ...] = ()
     sources: tuple[ParameterSource, ...] = ()
     namespace_parameters: Mapping[str, Any] = field(default_factory=dict)
-    late: Callable[[Lookup], LatePlan] | None = None
+    late_plan: Callable[[Lookup], LatePlan] | None = None
     companions: tuple[NodePlan, ...] = ()
 
 
 def ros1_plan(plan: NodePlan) -> NodePlan:
-    """Returns the node of ROS 1 that stands for one of ROS 2; others as they are.
+    """Returns the ROS 1 node that replaces a ROS 2 node; other nodes are not changed.
 
     Raises:
-        LaunchError: It has arguments that ROS 1's node has not.
+        LaunchError: The node has arguments that the ROS 1 node does not support.
     """
     translate = ROS1_PROGRAMS.get((plan.package, plan.executable))
     return plan if translate is None else translate(plan)
 
 
 def _rviz(plan: NodePlan) -> NodePlan:
-    """RViz; with MoveIt's parameters also the marker that drags the goal, which is in RViz's window in ROS 2."""
+    """Converts RViz; with MoveIt's parameters, a node with the goal marker, which ROS 2 has in RViz, is added."""
     given = {name for source in plan.sources for name in source.content}
     patience = ParameterSource({"connection_timeout": MARKER_TIMEOUT_S})
     program = "interactive_goal"
@@ -83,7 +83,7 @@ def _rviz(plan: NodePlan) -> NodePlan:
 
 
 def _rviz_ros1(plan: NodePlan) -> NodePlan:
-    """RViz with a configuration that RViz of ROS 1 reads."""
+    """Converts RViz's configuration to ROS 1."""
     arguments: list[str] = []
     for argument in plan.arguments:
         option, equals, value = argument.partition("=")
@@ -99,13 +99,13 @@ def _rviz_ros1(plan: NodePlan) -> NodePlan:
 RVIZ_CONFIG = ("-d", "--display-config")
 SIMULATION = ("modular_framework_simulation", "simulation")
 MARKER_TIMEOUT_S = 300.0
-"""How long the marker for goals waits for move_group [s], whose first start compiles what it runs."""
+"""Timeout of the goal marker's connection to move_group [s], whose first start compiles its kernels."""
 _TRANSFORM_DEFAULTS = {"--x": "0", "--y": "0", "--z": "0", "--yaw": "0", "--pitch": "0", "--roll": "0"}
 _QUATERNION = ("--qx", "--qy", "--qz", "--qw")
 
 
 def _static_transform(plan: NodePlan) -> NodePlan:
-    """The transform as position, angles or quaternion, parent and child frame, without names."""
+    """Converts named arguments to position, angles or quaternion, parent frame and child frame."""
     if not any(argument.startswith("--") for argument in plan.arguments):
         return plan
     names = [*_TRANSFORM_DEFAULTS, *_QUATERNION, "--frame-id", "--child-frame-id"]
@@ -118,25 +118,25 @@ def _static_transform(plan: NodePlan) -> NodePlan:
     angles = [values[name] for name in ("--yaw", "--pitch", "--roll")]
     quaternion = [values[name] for name in _QUATERNION]
     if any(quaternion) and any(angles):
-        raise LaunchError("static_transform_publisher: got angles and a quaternion; allowed: one of them")
+        raise LaunchError("static_transform_publisher: got angles and a quaternion; allowed: angles or a quaternion")
     rotation = [value or default for value, default in zip(quaternion, "0001", strict=True)]
     rotation = rotation if any(quaternion) else [value or "0" for value in angles]
     return replace(plan, arguments=(*position, *rotation, values["--frame-id"], values["--child-frame-id"]))
 
 
 def _control_node(plan: NodePlan) -> NodePlan:
-    """The node with hardware and controller manager: controllers from its files, hardware from the description.
+    """Converts the node with hardware and controller manager; the robot description names the hardware.
 
-    Where that is simulated hardware, the program is the simulation, which has the controller manager in it.
+    If the hardware is simulated, the simulation replaces the program, because it contains the controller manager.
     """
     name = plan.name or "controller_manager"
     private = ros2_control.manager_parameters(plan.sources, plan.namespace, name)
     controllers = ros2_control.controller_parameters(plan.sources)
 
-    def late(lookup: Lookup) -> LatePlan:
+    def late_plan(lookup: Lookup) -> LatePlan:
         hardware = hardware_plan(lookup, plan.namespace, private, controllers)
         program = SIMULATION if hardware.simulated else None
-        return LatePlan(hardware.parameters, hardware.around, hardware.simulated, program)
+        return LatePlan(hardware.parameters, hardware.namespace_parameters, hardware.simulated, program)
 
     return replace(
         plan,
@@ -145,12 +145,12 @@ def _control_node(plan: NodePlan) -> NodePlan:
         name=name,
         sources=(ParameterSource(private),),
         namespace_parameters=controllers,
-        late=late,
+        late_plan=late_plan,
     )
 
 
 def _spawner(plan: NodePlan) -> NodePlan:
-    """Loads and starts controllers, then ends; with --unload-on-kill it stays, and unloads them at its end."""
+    """Converts the spawner, which loads and starts controllers; with --unload-on-kill, it unloads them at its exit."""
     parser = _Parser("spawner")
     parser.add_argument("controller_names", nargs="+")
     parser.add_argument("-c", "--controller-manager", default="controller_manager")
@@ -186,7 +186,7 @@ def _spawner(plan: NodePlan) -> NodePlan:
 
 
 def _unspawner(plan: NodePlan) -> NodePlan:
-    """Stops and unloads controllers, then ends."""
+    """Converts the unspawner, which stops and unloads controllers."""
     parser = _Parser("unspawner")
     parser.add_argument("controller_names", nargs="+")
     parser.add_argument("-c", "--controller-manager", default="controller_manager")
@@ -205,11 +205,11 @@ ROS1_PROGRAMS: Mapping[tuple[str, str], Callable[[NodePlan], NodePlan]] = {
     ("controller_manager", "spawner.py"): _spawner,
     ("controller_manager", "unspawner"): _unspawner,
 }
-"""Package and program of ROS 2, and what makes the node of ROS 1 of it."""
+"""Conversion functions, by package and program of ROS 2."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser of a node's arguments that raises."""
+    """Argument parser of a node that raises LaunchError."""
 
     def __init__(self, program: str) -> None:
         super().__init__(prog=program, add_help=False, allow_abbrev=False)
@@ -219,7 +219,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _joined_negative_numbers(arguments: Sequence[str]) -> list[str]:
-    """Writes `--x -1e-3` as `--x=-1e-3`, which argparse takes for an option otherwise."""
+    """Joins `--x -1e-3` to `--x=-1e-3`, because argparse would parse the number as an option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and joined[-1].startswith("--") and "=" not in joined[-1] and not argument.startswith("--"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS 2's controller files in the words of ros_control."""
+"""Converts ROS 2's controller files to ros_control."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from launch_ros.parameter_descriptions import read_yaml_mapping
 
 MANAGER = "controller_manager"
 JOINT_STATE_RATE = 50.0
-"""Rate of joint states [1/s] when the file names none."""
+"""Default rate of joint states [Hz]."""
 CONTROLLER_TYPES = {
     "joint_state_broadcaster/JointStateBroadcaster": "joint_state_controller/JointStateController",
     "parallel_gripper_action_controller/GripperActionController": "position_controllers/GripperActionController",
@@ -31,9 +31,9 @@ CONTROLLER_TYPES = {
         "force_torque_sensor_controller/ForceTorqueSensorController"
     ),
 }
-"""Types of ROS 2 that have one other name on ROS 1; those that depend on interfaces are in `ros1_type`."""
+"""ROS 1 names of ROS 2 controller types; `ros1_type` converts types that depend on command interfaces."""
 NO_TIME_LIMIT_S = 1e9
-"""`goal_time` of ros_control for a goal that may be reached at any time after its end [s]."""
+"""Value of `goal_time` in ros_control for a goal without a time limit [s]."""
 TRAJECTORY_TYPE = "joint_trajectory_controller/JointTrajectoryController"
 FORWARD_TYPES = (
     "forward_command_controller/ForwardCommandController",
@@ -43,11 +43,11 @@ FORWARD_TYPES = (
 
 @dataclass(frozen=True, slots=True)
 class JointCommands:
-    """The words of ros_control for joints that take certain commands.
+    """Names in ros_control for joints with a set of command interfaces.
 
     Attributes:
-        interface: Their hardware interface.
-        package: Package of their trajectory controller.
+        interface: Hardware interface of the joints.
+        package: Package of the trajectory controller.
     """
 
     interface: str
@@ -61,33 +61,33 @@ JOINT_COMMANDS = {
     ("position", "velocity"): JointCommands("PosVelJointInterface", "pos_vel_controllers"),
     ("acceleration", "position", "velocity"): JointCommands("PosVelAccJointInterface", "pos_vel_acc_controllers"),
 }
-"""By ROS 2's command interfaces of a joint, in order."""
+"""Names in ros_control, by sorted ROS 2 command interfaces of a joint."""
 
 
 def source_of(path: str) -> ParameterSource:
-    """Returns what a parameter file holds."""
+    """Returns the contents of a parameter file."""
     return ParameterSource(read_yaml_mapping(Path(path)), Path(path))
 
 
-def namespace_of_manager(manager: str, around: str) -> str:
-    """Returns the namespace of a controller manager's services, from the name ROS 2's spawner takes.
+def namespace_of_manager(manager: str, base: str) -> str:
+    """Returns the namespace of a controller manager's services from the name in ROS 2's spawner.
 
     Args:
-        manager: Name of the manager's node, `/robot/controller_manager`.
-        around: Namespace for a relative name.
+        manager: Name of the manager's node, such as `/robot/controller_manager`.
+        base: Namespace of relative names.
     """
-    return join(around, manager.rstrip("/").rpartition("/")[0] or ("/" if manager.startswith("/") else None))
+    return join(base, manager.rstrip("/").rpartition("/")[0] or ("/" if manager.startswith("/") else None))
 
 
 def ros1_type(type_name: str, parameters: Mapping[str, Any]) -> str:
-    """Returns ROS 1's name of a controller type; a type that is not of ROS 2 stays as it is.
+    """Returns the ROS 1 name of a controller type; types that are not specific to ROS 2 are not changed.
 
     Args:
-        type_name: The type.
+        type_name: Controller type.
         parameters: Parameters of the controller.
 
     Raises:
-        LaunchError: ROS 1 has no controller for these command interfaces.
+        LaunchError: ROS 1 has no controller for the command interfaces.
     """
     if type_name == TRAJECTORY_TYPE:
         interfaces = tuple(sorted(parameters.get("command_interfaces", ["position"])))
@@ -102,12 +102,12 @@ def ros1_type(type_name: str, parameters: Mapping[str, Any]) -> str:
 
 
 def manager_parameters(sources: Sequence[ParameterSource], namespace: str, name: str) -> dict[str, Any]:
-    """Returns what entries give to the controller manager itself, without its controllers.
+    """Returns the controller manager's own parameters, without its controllers.
 
     Args:
-        sources: Entries of its `parameters`.
-        namespace: Its namespace.
-        name: Its name.
+        sources: Entries of the node's `parameters`.
+        namespace: Namespace of the node.
+        name: Name of the node.
     """
     private: dict[str, Any] = {}
     for source in sources:
@@ -122,10 +122,10 @@ def manager_parameters(sources: Sequence[ParameterSource], namespace: str, name:
 
 
 def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[str, Any]]:
-    """Returns the controllers that entries describe, with their parameters in the words of ROS 1.
+    """Returns the controllers with their parameters, converted to ROS 1.
 
-    A file of ROS 2 names them and their types below the controller manager and has a section for each; a file of
-    ROS 1 has a mapping with a type for each.
+    A ROS 2 file lists the controllers and types in the controller manager's section and has a section per controller;
+    a ROS 1 file has a mapping with a type per controller.
     """
     types: dict[str, str] = {}
     found: dict[str, dict[str, Any]] = {}
@@ -158,15 +158,15 @@ def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str,
 
 
 def _ros1_trajectory_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns what ROS 2's trajectory controller names otherwise, or means otherwise, than that of ROS 1.
+    """Converts the parameters of ROS 2's trajectory controller that have another name or meaning in ROS 1.
 
-    `open_loop_control` needs no translation: a motion of ROS 1 begins where the one before it commands the joints.
+    `open_loop_control` is not converted, because motions of ROS 1 always start at the last commanded positions.
     """
     constraints = dict(parameters.get("constraints", {}))
     if not constraints.get("goal_time"):
         constraints["goal_time"] = NO_TIME_LIMIT_S
     if "velocity" not in parameters.get("state_interfaces", ("position", "velocity")):
-        constraints["stopped_velocity_tolerance"] = 0.0  # a velocity that is not read is not checked
+        constraints["stopped_velocity_tolerance"] = 0.0  # an unavailable velocity is not checked
     gains = {joint: dict(values) for joint, values in parameters.get("gains", {}).items()}
     feed_forward = {
         joint: values.pop("ff_velocity_scale") for joint, values in gains.items() if "ff_velocity_scale" in values

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The hardware of a robot for ros_control: what `<ros2_control>` in its description names, or mock hardware."""
+"""Determines the hardware of a robot for ros_control, from `<ros2_control>` in its description or as mock hardware."""
 
 from __future__ import annotations
 
@@ -28,40 +28,40 @@ from modular_framework_urdf.urdf_reader import read_urdf
 
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
 SINGLE_AXIS = ("revolute", "continuous", "prismatic")
-"""Kinds of joints that controllers move."""
+"""Types of joints that controllers move."""
 
 
 @dataclass(frozen=True, slots=True)
 class HardwarePlan:
-    """How the control node gets its hardware.
+    """Hardware of a control node.
 
     Attributes:
         parameters: Parameters of the node.
-        around: Parameters of its namespace.
-        simulated: Whether the simulation is to run in its place: world, robot, controllers and clock are one program.
+        namespace_parameters: Parameters of the node's namespace.
+        simulated: Whether the simulation replaces the node, as it contains world, robot, controllers and clock.
     """
 
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    around: Mapping[str, Any] = field(default_factory=dict)
+    namespace_parameters: Mapping[str, Any] = field(default_factory=dict)
     simulated: bool = False
 
 
 def hardware_plan(
     lookup: Lookup, namespace: str, private: Mapping[str, Any], controllers: Mapping[str, Mapping[str, Any]]
 ) -> HardwarePlan:
-    """Returns the hardware of the control node: what `<ros2_control>` in the robot's description names.
+    """Returns the hardware of a control node, as named by `<ros2_control>` in the robot description.
 
-    Without such a tag it is mock hardware with all joints of the robot that can be moved, in the first state of each
-    group that the SRDF names. Where `type` or `robot_hardware` says it already, there is nothing to add.
+    Without this tag, the hardware is mock hardware with all movable joints, initially in the first state of each group
+    in the SRDF. If `type` or `robot_hardware` already defines the hardware, nothing is added.
 
     Args:
-        lookup: Look-up of parameters.
+        lookup: Parameter lookup.
         namespace: Namespace of the node.
-        private: The node's own parameters.
-        controllers: Controllers with their parameters.
+        private: Parameters of the node.
+        controllers: Parameters of the controllers, by name.
 
     Raises:
-        LaunchError: There is neither description nor joint, or the hardware cannot be had together.
+        LaunchError: Neither a description nor a joint is given, or the hardware cannot be combined.
     """
     if "type" in private or lookup(full_name(namespace, "robot_hardware")) is not None:
         return HardwarePlan()
@@ -77,32 +77,32 @@ def hardware_plan(
         joints = _joints_of_description(urdf, lookup(full_name(namespace, f"{DESCRIPTION}_semantic"))) if urdf else []
         described = [("mock", _mock(joints or _joints_of_controllers(controllers), ("position",)))]
         get_logger().warning(
-            "the robot description has no <ros2_control> tag: mock hardware for %s",
+            "the robot description has no <ros2_control> tag; using mock hardware for %s",
             ", ".join(described[0][1]["joints"]),
         )
     if len(described) == 1:
         return HardwarePlan(parameters=described[0][1])
-    return HardwarePlan(around={"robot_hardware": [name for name, _ in described], **dict(described)})
+    return HardwarePlan(namespace_parameters={"robot_hardware": [name for name, _ in described], **dict(described)})
 
 
 def _simulation(tags: Iterable[Ros2ControlHardware], namespace: str) -> HardwarePlan:
-    """Returns the simulation, which reads joints and initial positions from the description by itself."""
+    """Returns the simulation, which reads joints and initial positions from the description itself."""
     others = [tag for tag in tags if not tag.simulated]
     if others:
         raise LaunchError(
             f"{DESCRIPTION}: <ros2_control name='{others[0].name}'> is {others[0].plugin} beside simulated hardware; "
-            "allowed: all of it simulated, or none, because the clock of a simulation is not that of other hardware"
+            "allowed: only simulated hardware, or none, because other hardware does not follow the simulation's clock"
         )
     if namespace != "/":
         raise LaunchError(
             f"a control node in namespace {namespace} has simulated hardware; allowed: namespace /, because the "
-            f"simulation has one robot, /{DESCRIPTION}"
+            f"simulation has a single robot, /{DESCRIPTION}"
         )
     return HardwarePlan({name: value for tag in tags for name, value in tag.parameters.items()}, simulated=True)
 
 
 def _parts(hardware: Ros2ControlHardware) -> list[tuple[str, dict[str, Any]]]:
-    """Returns the hardware of ROS 1 for a tag, by name; mock hardware has one kind of command, so it may be several."""
+    """Returns the ROS 1 hardware of a tag, by name; mock hardware is split, because it has one command interface."""
     name = re.sub(r"\W", "_", hardware.name) or "hardware"
     if hardware.plugin not in MOCK_PLUGINS:
         joints = [joint.name for joint in hardware.joints]
@@ -134,7 +134,7 @@ def _mock(joints: Iterable[Ros2ControlJoint], interfaces: tuple[str, ...]) -> di
 
 
 def _joints_of_description(urdf: str, srdf: str | None) -> list[Ros2ControlJoint]:
-    """Returns the joints that can be moved; each begins as its first group state, or as near to 0 as it may."""
+    """Returns the movable joints, initially in their first group state, or at the allowed position nearest to 0."""
     states: dict[str, float] = {}
     for of_group in (read_srdf(srdf).group_states if srdf else {}).values():
         for positions in of_group.values():
@@ -156,7 +156,7 @@ def _joints_of_controllers(controllers: Mapping[str, Mapping[str, Any]]) -> list
         names |= dict.fromkeys([*parameters.get("joints", ()), *single])
     if not names:
         raise LaunchError(
-            f"the hardware is not known: there is no parameter {DESCRIPTION}, and no controller names a joint; give "
-            "the description to a node of this namespace, or name joints"
+            f"the hardware is unknown: the parameter {DESCRIPTION} is not set, and no controller has joints; set the "
+            "description for a node of this namespace, or add joints to a controller"
         )
     return [Ros2ControlJoint(name, ("position",), 0.0) for name in names]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS arguments of ROS 2 (`--ros-args -r a:=b -p c:=d --`) in the words of ROS 1."""
+"""Converts ROS arguments of ROS 2 (`--ros-args -r a:=b -p c:=d --`) to ROS 1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from launch.core.errors import LaunchError, hint
 
 REMAP, PARAMETER, FILE = ("-r", "--remap"), ("-p", "--param"), ("--params-file",)
 IGNORED_WITH_VALUE = ("--log-level", "--log-config-file", "-e", "--enclave")
-"""About logging and security; ROS 1 has other means for them."""
+"""Options for logging and security, which ROS 1 configures differently."""
 IGNORED = (
     "--enable-rosout-logs",
     "--disable-rosout-logs",
@@ -25,12 +25,12 @@ IGNORED = (
 
 @dataclass
 class RosArguments:
-    """What ROS arguments say.
+    """Parsed ROS arguments.
 
     Attributes:
-        name: Name of the node; empty when they say none.
-        namespace: Its namespace; empty when they say none.
-        remappings: Pairs of a name and what stands for it.
+        name: Name of the node; empty if not given.
+        namespace: Namespace of the node; empty if not given.
+        remappings: Pairs of old and new name.
         parameters: Dicts and paths of files.
     """
 
@@ -41,10 +41,10 @@ class RosArguments:
 
 
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], RosArguments]:
-    """Returns the program's own arguments, and what the ROS arguments between `--ros-args` and `--` say.
+    """Returns the program's own arguments, and the parsed ROS arguments between `--ros-args` and `--`.
 
     Raises:
-        LaunchError: A ROS argument is not known.
+        LaunchError: A ROS argument is unknown.
     """
     own: list[str] = []
     found, inside = RosArguments(), False
@@ -59,14 +59,14 @@ def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], RosArgumen
         elif word in IGNORED:
             continue
         elif word in (*REMAP, *PARAMETER, *FILE, *IGNORED_WITH_VALUE):
-            _take(word, next(words, ""), found)
+            _parse_argument(word, next(words, ""), found)
         else:
             allowed = (*REMAP, *PARAMETER, *FILE, *IGNORED_WITH_VALUE, *IGNORED)
-            raise LaunchError(f"ROS argument '{word}'{hint(word, allowed)}; allowed: {', '.join(allowed)}")
+            raise LaunchError(f"unknown ROS argument '{word}'{hint(word, allowed)}; allowed: {', '.join(allowed)}")
     return own, found
 
 
-def _take(word: str, value: str, found: RosArguments) -> None:
+def _parse_argument(word: str, value: str, found: RosArguments) -> None:
     if word in IGNORED_WITH_VALUE:
         return
     if word in FILE:
@@ -74,7 +74,7 @@ def _take(word: str, value: str, found: RosArguments) -> None:
         return
     name, separator, meaning = value.partition(":=")
     if not separator:
-        raise LaunchError(f"ROS argument '{word} {value}'; allowed: {word} NAME:=VALUE")
+        raise LaunchError(f"got the ROS argument '{word} {value}'; allowed: {word} NAME:=VALUE")
     if word in PARAMETER:
         found.parameters.append({name: yaml.safe_load(meaning)})
     elif name == "__node" or name == "__name":

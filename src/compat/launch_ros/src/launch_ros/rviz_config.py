@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Translates configurations of RViz of ROS 2 into those of ROS 1: names of classes and of properties."""
+"""Converts RViz configurations of ROS 2 to ROS 1 by renaming classes and properties."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ROS2_PACKAGES = ("rviz_default_plugins", "rviz_common")
 """Packages of ROS 2 whose classes are in the package `rviz` of ROS 1."""
 RENAMED = {"rviz_default_plugins/Wrench": "rviz/WrenchStamped"}
 BUILT_IN = ("Group", "Displays", "Help", "Selection", "Time", "Tool Properties", "Views")
-"""Classes that RViz has without a plugin description."""
+"""Classes of RViz without a plugin description."""
 TOPIC_NAMES = {
     "rviz/Marker": "Marker Topic",
     "rviz/MarkerArray": "Marker Topic",
     "rviz/Image": "Image Topic",
     "rviz/Camera": "Image Topic",
 }
-"""Property with the topic, by the display that does not call it `Topic` on ROS 1."""
+"""Topic property of ROS 1 displays whose property is not named `Topic`."""
 MOVEIT = "moveit_rviz_plugin/"
 SCENE_CLASSES = ("rviz/RobotModel", "rviz/MarkerArray", "rviz/InteractiveMarkers")
 
@@ -37,11 +37,11 @@ Config = dict[str, Any]
 
 @dataclass
 class RvizTranslator:
-    """Translates RViz configurations.
+    """Converts RViz configurations.
 
     Args:
-        classes: Classes that RViz of ROS 1 has.
-        moveit_displays: Displays that stand for the displays of MoveIt's plugin.
+        classes: Classes of RViz on ROS 1.
+        moveit_displays: Displays that replace the displays of MoveIt's plugin.
     """
 
     classes: Collection[str]
@@ -49,7 +49,7 @@ class RvizTranslator:
     remarks: list[str] = field(default_factory=list, init=False)
 
     def config(self, config: Mapping[str, Any]) -> Config:
-        """Returns the configuration for ROS 1; `remarks` then says what it lacks."""
+        """Returns the configuration for ROS 1, and adds missing parts to `remarks`."""
         ros1 = dict(config)
         if "Panels" in ros1:
             ros1["Panels"] = self._entries("panel", ros1["Panels"], _same)
@@ -70,7 +70,7 @@ class RvizTranslator:
         return ros1
 
     def _views(self, views: Mapping[str, Any]) -> Config:
-        """Returns the views; without the current one, if ROS 1 lacks its class, RViz starts with its own default."""
+        """Converts the views; if the class of the current view is missing, RViz starts with its default view."""
         ros1 = dict(views)
         current = ros1.pop("Current", None)
         for view in self._entries("view", [current], _view):
@@ -80,7 +80,7 @@ class RvizTranslator:
         return ros1
 
     def _displays(self, entries: Any) -> list[Config]:
-        """Returns the displays; those in a group, too, and one group in place of all of MoveIt's plugin."""
+        """Converts the displays, including groups; one group replaces all displays of MoveIt's plugin."""
         displays: list[Config] = []
         for entry in self._entries("display", self._without_moveit(entries), _properties):
             inner = {"Displays": self._displays(entry["Displays"])} if "Displays" in entry else {}
@@ -97,7 +97,7 @@ class RvizTranslator:
             return kept
         names = ", ".join(str(entry.get("Name", entry["Class"])) for entry in moveit)
         self.remarks.append(
-            f"displays {names} of MoveIt's plugin: replaced by the displays of moveit_ros_visualization"
+            f"displays {names} of MoveIt's plugin are replaced by the displays of moveit_ros_visualization"
         )
         enabled = any(entry.get("Enabled", True) for entry in moveit)
         displays = [dict(each) for each in self.moveit_displays]
@@ -114,12 +114,12 @@ class RvizTranslator:
                 found.append(translate({**entry, "Class": name}))
             else:
                 called = f"'{entry['Name']}' " if entry.get("Name") else ""
-                self.remarks.append(f"{kind} {called}({own}) left out: RViz of ROS 1 has no such class")
+                self.remarks.append(f"{kind} {called}({own}) is left out, because RViz of ROS 1 has no such class")
         return found
 
 
 def ros1_class(name: str) -> str:
-    """Returns the name that a class of RViz of ROS 2 has on ROS 1; other names as they are."""
+    """Returns the ROS 1 name of an RViz class of ROS 2; other names are not changed."""
     package, _, own = name.partition("/")
     return RENAMED.get(name, f"rviz/{own}" if package in ROS2_PACKAGES else name)
 
@@ -129,14 +129,14 @@ def _same(entry: Config) -> Config:
 
 
 def _view(entry: Config) -> Config:
-    """Returns a view whose type in RViz's list (`FPS (rviz_default_plugins)`) is that of ROS 1."""
+    """Converts the type of a view in RViz's list, such as `FPS (rviz_default_plugins)`."""
     value = entry.get("Value")
     renamed = {"Value": value.replace("(rviz_default_plugins)", "(rviz)")} if isinstance(value, str) else {}
     return entry | renamed
 
 
 def _properties(entry: Config) -> Config:
-    """Returns a display or tool whose topics are names, not mappings with a quality of service."""
+    """Converts topics of a display or tool from mappings with quality-of-service settings to names."""
     ros1: Config = {}
     for key, value in entry.items():
         if isinstance(value, Mapping) and "Value" in value and "Reliability Policy" in value:
@@ -146,7 +146,7 @@ def _properties(entry: Config) -> Config:
                 ros1["Unreliable"] = True
         else:
             ros1[key] = value
-    if "Description Topic" in ros1:  # ROS 1 has the description in a parameter of that name
+    if "Description Topic" in ros1:  # ROS 1 reads the description from a parameter with this name
         ros1["Robot Description"] = ros1.pop("Description Topic") or "robot_description"
     if "Interactive Markers Namespace" in ros1:
         ros1["Update Topic"] = f"{str(ros1.pop('Interactive Markers Namespace')).rstrip('/')}/update"
@@ -154,10 +154,10 @@ def _properties(entry: Config) -> Config:
 
 
 def ros1_config_file(path: Path) -> Path:
-    """Returns a file that RViz of ROS 1 reads: the given one, or its translation in `$ROS_HOME/modular_framework/rviz`.
+    """Returns a configuration file for RViz on ROS 1: the given file, or a converted file in the ROS home folder.
 
-    What ROS 1 lacks is reported, one line each. A missing or invalid file is not translated, since RViz
-    reports its fault.
+    Converted files are in `$ROS_HOME/modular_framework/rviz`. Each missing part is logged. A missing or invalid file is
+    not converted, because RViz reports its fault.
     """
     try:
         config = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -176,12 +176,12 @@ def ros1_config_file(path: Path) -> Path:
     target = Path(rospkg.get_ros_home()) / "modular_framework" / "rviz" / f"{path.stem}_{digest}{path.suffix}"
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(yaml.safe_dump(ros1, sort_keys=False), encoding="utf-8")
-    get_logger("rviz").info("%s is translated for ROS 1: %s", path, target)
+    get_logger("rviz").info("%s is converted for ROS 1: %s", path, target)
     return target
 
 
 def _plugin_classes(descriptions: Iterable[Path]) -> set[str]:
-    """Returns the classes of plugin descriptions, except those of unreadable files, which pluginlib reports."""
+    """Returns the classes in plugin descriptions, except in unreadable files, which pluginlib reports."""
     found = set()
     for description in descriptions:
         with contextlib.suppress(OSError, xml_text.XmlError):
@@ -191,7 +191,7 @@ def _plugin_classes(descriptions: Iterable[Path]) -> set[str]:
 
 
 def _moveit_displays() -> list[Config]:
-    """Returns the displays of robot, scene, motions and goal from the configuration of moveit_ros_visualization."""
+    """Returns the displays of robot, scene, motions and goal in the configuration of moveit_ros_visualization."""
     try:
         share = Path(package_share_directory("moveit_ros_visualization"))
         config = yaml.safe_load((share / "config" / "moveit.rviz").read_text(encoding="utf-8"))

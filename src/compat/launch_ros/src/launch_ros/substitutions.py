@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitutions about ROS packages and parameters."""
+"""Substitutions for ROS packages and parameters."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ __all__ = ["ExecutableInPackage", "FindPackage", "FindPackagePrefix", "FindPacka
 
 
 class FindPackage(SubstitutionOfText):
-    """Base: a folder of a ROS package.
+    """Base class of substitutions by a folder of a ROS package.
 
     Args:
-        package: Its name.
+        package: Name of the package.
     """
 
     package = SubstitutionOfText.text
@@ -34,27 +34,27 @@ class FindPackage(SubstitutionOfText):
         """Returns the folder.
 
         Raises:
-            PackageNotFoundError: There is no such package.
+            PackageNotFoundError: The package does not exist.
         """
-        raise NotImplementedError(f"{type(self).__name__} does not say which folder: define find(package_name)")
+        raise NotImplementedError(f"{type(self).__name__} has no folder; define find(package_name)")
 
     def _value(self, context: LaunchContext, package: str) -> str:
         return self.find(package)
 
     def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
-        """Returns a path in the folder, as `FindPackageShare("robot") / "config"`."""
+        """Returns a path in the folder, as in `FindPackageShare("robot") / "config"`."""
         return PathJoinSubstitution([self, normalize_to_list_of_substitutions(part)])
 
 
 class FindPackageShare(FindPackage):
-    """The folder with a package's files."""
+    """Share folder of a package."""
 
     def find(self, package_name: str) -> str:
         return package_share_directory(package_name)
 
 
 class FindPackagePrefix(FindPackage):
-    """The folder that a package is installed in; in a workspace that is not installed, that of its files."""
+    """Installation prefix of a package; in a workspace without installation, the share folder."""
 
     def find(self, package_name: str) -> str:
         share = Path(package_share_directory(package_name))
@@ -62,10 +62,10 @@ class FindPackagePrefix(FindPackage):
 
 
 class ExecutableInPackage(FindPackage):
-    """The path of a package's program.
+    """Path of a package's program.
 
     Args:
-        executable: Its name.
+        executable: Name of the program.
         package: Name of the package.
     """
 
@@ -81,11 +81,11 @@ class ExecutableInPackage(FindPackage):
 
 
 class Parameter(SubstitutionOfText):
-    """The value of a parameter that SetParameter set.
+    """Value of a parameter set by SetParameter.
 
     Args:
-        name: Its name.
-        default: Value when it was not set.
+        name: Name of the parameter.
+        default: Value of a parameter that is not set.
     """
 
     def __init__(self, name: SomeSubstitutionsType, *, default: Any = None) -> None:
@@ -100,7 +100,7 @@ class Parameter(SubstitutionOfText):
             return str(known[name])
         if self._default is None:
             raise SubstitutionFailure(
-                f"no SetParameter has set '{name}' here{hint(name, known)}; set here: {listed(known)}; set it before, "
+                f"no SetParameter has set '{name}'{hint(name, known)}; set: {listed(known)}; set it before, "
                 "or give Parameter a default"
             )
         is_text = isinstance(self._default, str | Substitution | list | tuple)

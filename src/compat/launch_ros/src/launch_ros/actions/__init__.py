@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions about ROS nodes."""
+"""Actions on ROS nodes."""
 
 from __future__ import annotations
 
 from launch.actions import TimerAction as RosTimer
-from launch.core.errors import refusal_of
+from launch.core.errors import unsupported_names
 
 from launch_ros.actions.node import Node
 from launch_ros.actions.scopes import (
@@ -27,13 +27,13 @@ __all__ = [
     "SetUseSimTime",
 ]
 
-NOT_OFFERED = {
+UNSUPPORTED = {
     "ComposableNodeContainer": "ROS 1 has no components; start a Node for each",
     "LoadComposableNodes": "ROS 1 has no components; start a Node for each",
     "LifecycleNode": "nodes of ROS 1 have no life cycle; use Node",
     "LifecycleTransition": "nodes of ROS 1 have no life cycle; use Node",
     "SetROSLogDir": "set the environment variable ROS_LOG_DIR with SetEnvironmentVariable",
 }
-"""Actions of ROS 2 that are refused, with what to do."""
+"""Unsupported actions of ROS 2, with the alternative for the error message."""
 
-__getattr__ = refusal_of("launch_ros.actions", NOT_OFFERED)
+__getattr__ = unsupported_names("launch_ros.actions", UNSUPPORTED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Node: starts a ROS node under roslaunch's process monitor, with its parameters on the parameter server."""
+"""Node, which starts a ROS node under roslaunch's process monitor, with its parameters on the parameter server."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ NAMESPACE, PARAMETERS, REMAPPINGS = "ros_namespace", "global_params", "ros_remap
 
 
 class Node(ExecuteProcess):
-    """A ROS node.
+    """Starts a ROS node.
 
-    Its parameters are set before it, or any other process of the description, starts: in its private namespace, and the
-    robot's description also in the namespace of the node, where ROS 1's nodes look for it. A program of ROS 2 that has
-    another name on ROS 1 is found in the table of `launch_ros.ros1_programs`.
+    The launch sets the parameters of all nodes before any process starts. They are set in the node's private namespace;
+    the robot description is also set in the node's namespace, where ROS 1 nodes expect it. The table in
+    `launch_ros.ros1_programs` contains ROS 2 programs with another name on ROS 1.
 
     Args:
-        executable: Its program; without a package the path of a program.
+        executable: Name of the program; without a package, the path of the program.
         package: Package of the program.
-        name: Name of the node. Without it the program names itself, unless there are parameters: then the node is named
-            after the program.
-        namespace: Its namespace, absolute, or below the one that was pushed.
+        name: Name of the node. By default, the program sets its own name, or if the node has parameters, the name is
+            derived from the program.
+        namespace: Namespace of the node, absolute or relative to the pushed namespace.
         exec_name: Name of the process in messages.
-        parameters: Dicts, paths of YAML files, ParameterFile, Parameter; later ones win.
-        remappings: Pairs of a name and what stands for it.
+        parameters: Dicts, paths of YAML files, ParameterFile or Parameter objects; later entries override earlier ones.
+        remappings: Pairs of old and new name.
         ros_arguments: ROS arguments of ROS 2: `-r a:=b`, `-p a:=b`, `--params-file FILE`.
         arguments: Arguments of the program.
-        options: As of ExecuteProcess: output, respawn, respawn_delay, respawn_max_retries, on_exit, condition, prefix,
-            env, additional_env, cwd, sigterm_timeout, sigkill_timeout.
+        options: Options of ExecuteProcess: output, respawn, respawn_delay, respawn_max_retries, on_exit, condition,
+            prefix, env, additional_env, cwd, sigterm_timeout, sigkill_timeout.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Node(ExecuteProcess):
         **options: Any,
     ) -> None:
         if isinstance(arguments, str):
-            raise TypeError(f"Node: arguments is one text, '{arguments}'; allowed: a list of them; write [...]")
+            raise TypeError(f"Node: arguments is a single text, '{arguments}'; allowed: a list of texts, [...]")
         super().__init__(cmd=[executable], name=exec_name, **options)
         self._package = None if package is None else normalize_to_list_of_substitutions(package)
         self._node_name, self._namespace, self._exec_name = name, namespace, exec_name
@@ -74,9 +74,9 @@ class Node(ExecuteProcess):
 
     @property
     def node_name(self) -> str:
-        """Full name of the node, once it was visited."""
+        """Returns the full name of the node, which is known after its visit."""
         if not self._full_name:
-            raise LaunchError("the name of a node is known once it was visited")
+            raise LaunchError("the name of a node is only known after its visit")
         return self._full_name
 
     def describe(self) -> str:
@@ -98,7 +98,7 @@ class Node(ExecuteProcess):
             self._complete(context, added, companion, RosArguments())
 
     def _plan(self, context: LaunchContext) -> tuple[NodePlan, RosArguments]:
-        """Returns the node as ROS 2 would start it, and what its ROS arguments say."""
+        """Returns the node for ROS 2, and its ROS arguments."""
         arguments = [perform_text(context, each) for each in self._arguments]
         ros_arguments = [perform_text(context, each) for each in self._ros_arguments]
         arguments, own = split_ros_arguments([*arguments, "--ros-args", *ros_arguments])
@@ -114,8 +114,15 @@ class Node(ExecuteProcess):
         return NodePlan(package, executable, namespace, name, tuple(arguments), sources), own
 
     def _complete(self, context: LaunchContext, request: ProcessRequest, plan: NodePlan, own: RosArguments) -> None:
-        """Writes the node into the request of its process, and plans its parameters."""
-        name = plan.name or (name_from(plan.executable) if plan.sources or plan.late else "")
+        """Writes the node into the request of its process, and plans its parameters.
+
+        Args:
+            context: Launch context.
+            request: Request of the process.
+            plan: The node for ROS 1.
+            own: ROS arguments of the node.
+        """
+        name = plan.name or (name_from(plan.executable) if plan.sources or plan.late_plan else "")
         self._full_name = self._full_name or full_name(plan.namespace, name or name_from(plan.executable))
         path = program_of_package(plan.package, plan.executable) if plan.package else plan.executable
         request.name = full_name(plan.namespace, name or name_from(plan.executable)).lstrip("/")
@@ -140,12 +147,12 @@ class Node(ExecuteProcess):
             plan_parameters(context.parameters, plan.namespace, name, parameters)
         for key, value in plan.namespace_parameters.items():
             context.parameters.set(full_name(plan.namespace, key), value, f"node {node}")
-        late = plan.late
-        if late is None:
+        late_plan = plan.late_plan
+        if late_plan is None:
             return
 
         def prepare(lookup: Lookup) -> None:
-            found = late(lookup)
+            found = late_plan(lookup)
             owner = f"node {node}"
             for key, value in found.parameters.items():
                 context.parameters.set(full_name(node, key), value, owner)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Actions that concern all nodes after them in the same scope: namespace, parameters, remappings."""
+"""Actions that apply to all later nodes in the same scope: namespace, parameters and remappings."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from launch_ros.parameter_descriptions import evaluate_value
 
 
 class PushROSNamespace(Action):
-    """Puts the nodes after it into a namespace, until the end of the group around it.
+    """Sets the namespace of later nodes, until the end of the enclosing group.
 
     Args:
-        namespace: The namespace, absolute, or below the one that was pushed before.
+        namespace: Namespace, absolute or relative to the pushed namespace.
     """
 
     def __init__(self, namespace: SomeSubstitutionsType, **kwargs: Any) -> None:
@@ -41,11 +41,11 @@ PushRosNamespace = PushROSNamespace
 
 
 class SetParameter(Action):
-    """Gives a parameter to the nodes after it, until the end of the group around it.
+    """Sets a parameter of later nodes, until the end of the enclosing group.
 
     Args:
-        name: Its name.
-        value: Its value; the node's own parameters win.
+        name: Name of the parameter.
+        value: Value of the parameter; a node's own parameters override it.
     """
 
     def __init__(self, name: SomeSubstitutionsType, value: Any, **kwargs: Any) -> None:
@@ -61,7 +61,7 @@ class SetParameter(Action):
 
 
 class SetParametersFromFile(Action):
-    """Gives the parameters of a YAML file to the nodes after it, until the end of the group around it.
+    """Sets the parameters in a YAML file for later nodes, until the end of the enclosing group.
 
     Args:
         filename: Path of the file.
@@ -78,11 +78,11 @@ class SetParametersFromFile(Action):
 
 
 class SetRemap(Action):
-    """Remaps a name for the nodes after it, until the end of the group around it.
+    """Remaps a name for later nodes, until the end of the enclosing group.
 
     Args:
-        src: The name.
-        dst: What stands for it.
+        src: Old name.
+        dst: New name.
     """
 
     def __init__(self, src: SomeSubstitutionsType, dst: SomeSubstitutionsType, **kwargs: Any) -> None:
@@ -96,10 +96,10 @@ class SetRemap(Action):
 
 
 class SetUseSimTime(Action):
-    """Says whether nodes take the time from `/clock`: on ROS 1 all of a master do, or none.
+    """Sets whether nodes use the time of `/clock`; on ROS 1, the setting applies to all nodes of a master.
 
     Args:
-        value: Whether they do.
+        value: Whether nodes use the time of `/clock`.
     """
 
     def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any) -> None:
