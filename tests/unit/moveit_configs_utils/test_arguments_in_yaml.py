@@ -63,4 +63,4 @@ def test_a_launch_file_that_is_no_xml_is_a_warning(
 ) -> None:
     folder = make_package({**FILES, "launch/broken.launch": "<launch>"})
     assert names(MoveItConfigsBuilder("r")) == expected("panda")
-    assert f"{folder}/launch/broken.launch: defaults of its arguments are not known" in caplog.text
+    assert f"{folder}/launch/broken.launch: the defaults of its arguments are unknown" in caplog.text

@@ -142,7 +142,7 @@ def test_fake_controllers_of_moveit_1_are_run_by_the_manager_of_fake_ones(
 ) -> None:
     text = "controller_list: [{name: fake_arm, type: $(arg fake_execution_type), joints: [j1]}]\n"
     parameters = execution({"fake_controllers": text})
-    assert "fake_controllers.yaml: its controllers are fake ones: motions are not executed by a robot" in caplog.text
+    assert "fake_controllers.yaml: the controllers are fake controllers; no robot or simulation" in caplog.text
     assert parameters["moveit_controller_manager"] == "moveit_fake_controller_manager/MoveItFakeControllerManager"
     assert parameters["controller_list"] == [{"name": "fake_arm", "type": "interpolate", "joints": ["j1"]}]
 
@@ -162,10 +162,10 @@ def test_managers_of_ros2_control_have_the_names_of_ros_control_and_need_no_list
     [
         (
             "moveit_simple_controller_manager: {controller_names: [a, b], a: {type: FollowJointTrajectory}}",
-            "controller_names has b, of which nothing else is said; described are a",
+            "controller_names has b without parameters; controllers with parameters: a",
         ),
-        ("controller_list: {a: 1}", r"controller_list is {'a': 1}; a list of mappings with a name each"),
-        ("controller_list: [{joints: [a]}]", "a list of mappings with a name each is needed"),
+        ("controller_list: {a: 1}", r"controller_list is {'a': 1}; expected a list of mappings with a name each"),
+        ("controller_list: [{joints: [a]}]", "expected a list of mappings with a name each"),
     ],
 )
 def test_a_faulty_list_is_named_with_what_is_needed(

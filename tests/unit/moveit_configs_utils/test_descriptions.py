@@ -141,7 +141,7 @@ def test_a_missing_urdf_is_a_warning_since_somebody_else_may_set_it(
     assert configs.robot_description == {}
     assert "robot_description" not in configs.to_dict()
     assert f"File {folder}/config/r.urdf doesn't exist; {folder}/config has" in caplog.text
-    assert "somebody else has to set the parameter robot_description" in caplog.text
+    assert "another node has to set the parameter robot_description" in caplog.text
 
 
 def test_a_missing_srdf_is_an_error_that_lists_what_is_there(make_package: PackageMaker) -> None:
@@ -169,11 +169,11 @@ def test_a_urdf_outside_every_package_is_named_by_its_path(make_package: Package
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("moveit_setup_assistant_config: [1]", r"moveit_setup_assistant_config is \[1\]; a mapping is needed"),
-        ("moveit_setup_assistant_config: {urdf: {package: p}}", "urdf has package; needed are package and relative"),
+        ("moveit_setup_assistant_config: [1]", r"moveit_setup_assistant_config is \[1\]; expected a mapping"),
+        ("moveit_setup_assistant_config: {urdf: {package: p}}", "urdf has package; expected package and relative"),
         (
             "moveit_setup_assistant_config: {urdf: {package: p, relative_path: u, xacro_args: 'a:=1 b'}}",
-            "xacro_args has 'b'; every argument is needed as name:=value",
+            "xacro_args has 'b'; expected arguments name:=value",
         ),
         ("moveit_setup_assistant_config: [", r"\.setup_assistant:1:\d+: is not valid YAML"),
     ],

@@ -95,7 +95,7 @@ def test_an_argument_that_does_nothing_here_is_refused_by_name(configs: MoveItCo
 
 @pytest.mark.parametrize("generate", [launches.generate_warehouse_db_launch, launches.generate_setup_assistant_launch])
 def test_a_helper_that_does_nothing_here_is_refused_by_name(configs: MoveItConfigs, generate) -> None:
-    with pytest.raises(RuntimeError, match=f"{generate.__name__} is not offered: there is no"):
+    with pytest.raises(RuntimeError, match=f"{generate.__name__} is not supported: there is no"):
         generate(configs)
 
 

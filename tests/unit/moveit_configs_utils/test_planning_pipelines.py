@@ -141,7 +141,9 @@ def test_several_plugins_of_one_pipeline_are_a_warning_since_only_the_first_runs
 
 def test_a_list_of_adapters_that_is_none_is_refused(make_package: PackageMaker) -> None:
     make_package({"config/own_planning.yaml": "planning_plugin: module/Class\nrequest_adapters: {a: 1}\n"})
-    with pytest.raises(ParameterFileError, match="own_planning.yaml: request_adapters is {'a': 1}; a list of names"):
+    with pytest.raises(
+        ParameterFileError, match="own_planning.yaml: request_adapters is {'a': 1}; expected a list of names"
+    ):
         loaded(pipelines=["own"])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of launch files: an argument that is true or false, and a node with a mode for debugging."""
+"""Elements of launch files: a bool argument, and a node with a debugging mode."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ BOOLEANS = ("true", "false", "True", "False")
 
 
 class DeclareBooleanLaunchArg(DeclareLaunchArgument):
-    """A launch argument that is true or false.
+    """Declares a launch argument with the values true and false.
 
     Args:
-        name: Its name.
-        default_value: Its value when none is given.
-        description: What it is for.
+        name: Name of the argument.
+        default_value: Default value.
+        description: Description of the argument.
     """
 
     def __init__(self, name: str, *, default_value: Any = False, description: str | None = None, **kwargs: Any) -> None:
@@ -29,15 +29,17 @@ class DeclareBooleanLaunchArg(DeclareLaunchArgument):
 
 
 class DeclareRefusedLaunchArg(DeclareLaunchArgument):
-    """A launch argument of MoveIt 2 that can only be false here.
+    """Declares a launch argument of MoveIt 2 that must be false, because true is not supported.
 
     Args:
-        name: Its name.
-        reason: Why, and what to use instead.
+        name: Name of the argument.
+        reason: Reason, and the alternative.
     """
 
     def __init__(self, name: str, *, reason: str) -> None:
-        super().__init__(name, default_value="false", description=f"Not offered: {reason}", choices=["false", "False"])
+        super().__init__(
+            name, default_value="false", description=f"Not supported: {reason}", choices=["false", "False"]
+        )
 
 
 def add_debuggable_node(
@@ -49,19 +51,19 @@ def add_debuggable_node(
     extra_debug_args: Iterable[str] | None = None,
     **kwargs: Any,
 ) -> None:
-    """Adds a node; when a launch argument says so, with further arguments for debugging.
+    """Adds a node, with further arguments if a launch argument enables debugging.
 
-    There is no gdb, which MoveIt 2 puts before the program: the nodes here are Python programs. For another program
-    give the launch file `launch-prefix:="gdb -ex run --args"`.
+    Unlike MoveIt 2, this function does not run the program in gdb, because the nodes are Python programs. For another
+    program, use the launch argument `launch-prefix:="gdb -ex run --args"`.
 
     Args:
-        ld: The description.
+        ld: Launch description.
         package: Package of the program.
-        executable: The program.
+        executable: Name of the program.
         condition_name: Name of the launch argument.
-        commands_file: Commands of gdb; not used.
-        extra_debug_args: The further arguments.
-        **kwargs: Of Node.
+        commands_file: Commands for gdb; not used.
+        extra_debug_args: Further arguments for debugging.
+        **kwargs: Arguments of Node.
     """
     del commands_file
     ld.add_action(

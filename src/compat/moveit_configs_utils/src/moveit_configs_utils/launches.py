@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launch descriptions made of a MoveIt configuration: move_group, RViz, controllers, and a demonstration of all.
+"""Launch descriptions of a MoveIt configuration: move_group, RViz, controllers, and a demonstration.
 
-Names, arguments and defaults are those of MoveIt 2; what ROS 1 has not is refused by name.
+Names, arguments and defaults follow MoveIt 2; features without a counterpart on ROS 1 raise errors.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from moveit_configs_utils.launch_utils import DeclareBooleanLaunchArg, DeclareRe
 from moveit_configs_utils.moveit_configs import MoveItConfigs
 
 BROADCASTER = "joint_state_broadcaster"
-NO_WAREHOUSE = "there is no warehouse database; states and scenes are kept in files (.scene, SRDF)"
+NO_WAREHOUSE = "there is no warehouse database; store states and scenes in files (.scene, SRDF)"
 TRAJECTORY, GRIPPER = "FollowJointTrajectory", "GripperCommand"
 MOCK_CONTROLLERS = {
     TRAJECTORY: "joint_trajectory_controller/JointTrajectoryController",
     GRIPPER: "position_controllers/GripperActionController",
 }
-"""By the type of an entry of `controller_list`: the controller that a robot without a controller file gets."""
+"""Default controllers of a robot without a controller file, by type of the entry in `controller_list`."""
 
 
 def generate_rsp_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Returns a launch description of robot_state_publisher; argument publish_frequency [1/s]."""
+    """Returns a launch description of robot_state_publisher; its argument is publish_frequency [Hz]."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument("publish_frequency", default_value="15.0", description="rate of moving frames [1/s]"),
+            DeclareLaunchArgument("publish_frequency", default_value="15.0", description="rate of moving frames [Hz]"),
             Node(
                 package="robot_state_publisher",
                 executable="robot_state_publisher",
@@ -52,7 +52,7 @@ def generate_rsp_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
 
 
 def generate_moveit_rviz_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Returns a launch description of RViz with the marker for goals; arguments debug, rviz_config."""
+    """Returns a launch description of RViz with the goal marker; its arguments are debug and rviz_config."""
     ld = LaunchDescription([DeclareBooleanLaunchArg("debug", default_value=False)])
     ld.add_action(
         DeclareLaunchArgument("rviz_config", default_value=_rviz_file(moveit_config), description="RViz configuration")
@@ -76,31 +76,31 @@ def generate_moveit_rviz_launch(moveit_config: MoveItConfigs) -> LaunchDescripti
 
 
 def _rviz_file(moveit_config: MoveItConfigs) -> str:
-    """Returns the RViz file of the config package, where MoveIt 2 or MoveIt 1 puts it."""
+    """Returns the RViz file of the config package, in the folder of MoveIt 2 or MoveIt 1."""
     places = [_package(moveit_config) / folder / "moveit.rviz" for folder in ("config", "launch")]
     return str(next((path for path in places if path.is_file()), places[0]))
 
 
 def _package(moveit_config: MoveItConfigs) -> Path:
     if moveit_config.package_path is None:
-        raise LaunchError("these MoveItConfigs name no package; make them with MoveItConfigsBuilder")
+        raise LaunchError("these MoveItConfigs have no package; create them with MoveItConfigsBuilder")
     return moveit_config.package_path
 
 
 def generate_setup_assistant_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Refused: there is no window of the Setup Assistant.
+    """Raises an error, because the Setup Assistant's window is not supported.
 
     Raises:
-        LaunchError: Always; it says what to use.
+        LaunchError: Always, with the alternative.
     """
     raise LaunchError(
-        "generate_setup_assistant_launch is not offered: there is no Setup Assistant's window; edit "
-        f"{_package(moveit_config)}, or make the packages of a robot with create_robot"
+        "generate_setup_assistant_launch is not supported: there is no window of the Setup Assistant; edit "
+        f"{_package(moveit_config)}, or create the packages of a robot with create_robot"
     )
 
 
 def generate_static_virtual_joint_tfs_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Returns a launch description with a static transform for each virtual joint between two frames."""
+    """Returns a launch description with a static transform per virtual joint between different frames."""
 
     def transforms(context: LaunchContext) -> list[Node]:
         nodes: list[Node] = []
@@ -128,7 +128,7 @@ def _controller_names(moveit_config: MoveItConfigs) -> list[str]:
 
 
 def generate_spawn_controllers_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Returns a launch description that starts the controllers of the configuration, and joint states."""
+    """Returns a launch description that starts the controllers of the configuration and a joint state publisher."""
     ld = LaunchDescription()
     for controller in [*_controller_names(moveit_config), BROADCASTER]:
         ld.add_action(Node(package="controller_manager", executable="spawner", arguments=[controller], output="screen"))
@@ -136,20 +136,20 @@ def generate_spawn_controllers_launch(moveit_config: MoveItConfigs) -> LaunchDes
 
 
 def generate_warehouse_db_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
-    """Refused: there is no warehouse database.
+    """Raises an error, because the warehouse database is not supported.
 
     Raises:
-        LaunchError: Always; it says what to use.
+        LaunchError: Always, with the alternative.
     """
     del moveit_config
-    raise LaunchError(f"generate_warehouse_db_launch is not offered: {NO_WAREHOUSE}")
+    raise LaunchError(f"generate_warehouse_db_launch is not supported: {NO_WAREHOUSE}")
 
 
 def generate_move_group_launch(moveit_config: MoveItConfigs) -> LaunchDescription:
     """Returns a launch description of move_group.
 
-    Arguments: debug (publish each request for a plan), allow_trajectory_execution, publish_monitored_planning_scene,
-    capabilities, disable_capabilities. monitor_dynamics can only be false.
+    Its arguments are debug (publish each planning request), allow_trajectory_execution,
+    publish_monitored_planning_scene, capabilities and disable_capabilities; monitor_dynamics must be false.
     """
     capabilities = moveit_config.move_group_capabilities
     ld = LaunchDescription(
@@ -187,26 +187,26 @@ def generate_move_group_launch(moveit_config: MoveItConfigs) -> LaunchDescriptio
 
 
 def generate_demo_launch(moveit_config: MoveItConfigs, launch_package_path: Path | None = None) -> LaunchDescription:
-    """Returns a launch description that needs nothing else to plan and move: mock hardware, move_group and RViz.
+    """Returns a complete launch description for planning and execution: mock hardware, move_group and RViz.
 
-    The hardware is what the `<ros2_control>` tags of the robot description name, and mock hardware without such tags;
-    controllers are those of config/ros2_controllers.yaml, without that file one for each entry of `controller_list`.
-    With MoveIt 1's fake controllers a joint_state_publisher shows where they are. Launch files of the config package
-    (rsp.launch.py, move_group.launch.py, moveit_rviz.launch.py, static_virtual_joint_tfs.launch.py,
-    spawn_controllers.launch.py) take the place of those of this module.
+    The `<ros2_control>` tags of the robot description define the hardware, which is mock hardware without such tags.
+    The controllers are in config/ros2_controllers.yaml; without this file, each entry of `controller_list` gets a
+    controller. With MoveIt 1's fake controllers, a joint_state_publisher publishes their positions. Launch files of the
+    config package (rsp.launch.py, move_group.launch.py, moveit_rviz.launch.py, static_virtual_joint_tfs.launch.py,
+    spawn_controllers.launch.py) replace the launch descriptions of this module.
 
     Args:
         moveit_config: The configuration.
-        launch_package_path: Folder of the package with those launch files; that of the configuration when not given.
+        launch_package_path: Folder of the package with the launch files; by default, the config package.
 
     Returns:
-        The description; arguments use_rviz, debug, and those of its parts. db can only be false.
+        The description with the arguments use_rviz, debug and the arguments of its parts; db must be false.
     """
     folder = (launch_package_path or _package(moveit_config)) / "launch"
     ld = LaunchDescription(
         [
             DeclareRefusedLaunchArg("db", reason=NO_WAREHOUSE),
-            DeclareBooleanLaunchArg("debug", default_value=False, description="publish each request for a plan"),
+            DeclareBooleanLaunchArg("debug", default_value=False, description="publish each planning request"),
             DeclareBooleanLaunchArg("use_rviz", default_value=True, description="whether to start RViz"),
         ]
     )
@@ -246,7 +246,7 @@ def _joint_states_of_fake_controllers() -> Node:
 
 
 def _controllers(moveit_config: MoveItConfigs) -> Path | Mapping[str, Any]:
-    """Returns the controller file of a config package, or controllers made of those that execute motions."""
+    """Returns the controller file of a config package, or default controllers for its controller list."""
     path = _package(moveit_config) / "config" / "ros2_controllers.yaml"
     if path.is_file():
         return path
@@ -256,7 +256,7 @@ def _controllers(moveit_config: MoveItConfigs) -> Path | Mapping[str, Any]:
         if kind not in MOCK_CONTROLLERS or not joints:
             raise LaunchError(
                 f"{path} is missing, and controller '{entry.get('name')}' of the configuration has type '{kind}' and "
-                f"joints {joints}; allowed without that file: {', '.join(MOCK_CONTROLLERS)} with joints; add the file"
+                f"joints {joints}; allowed without this file: {', '.join(MOCK_CONTROLLERS)} with joints; add the file"
             )
         which = {"joint": joints[0]} if kind == GRIPPER else {"joints": joints}
         made[str(entry["name"])] = {"type": MOCK_CONTROLLERS[kind], **which}

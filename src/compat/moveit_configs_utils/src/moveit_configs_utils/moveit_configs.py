@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters of a robot for move_group, section by section, and together as one dictionary."""
+"""Parameters of a robot for move_group, by section and as one dictionary."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ def _no_capabilities() -> Parameters:
 
 @dataclass(slots=True)
 class MoveItConfigs:
-    """Parameters of a robot; each section may be given to a node by itself.
+    """Parameters of a robot; each section may be passed to a node separately.
 
     Attributes:
-        package_path: folder of the config package.
-        robot_description: URDF, by the parameter's name.
-        robot_description_semantic: SRDF, by the parameter's name.
-        robot_description_kinematics: settings of inverse kinematics, by group.
-        planning_pipelines: `planning_pipelines/<name>/...` and `default_planning_pipeline`.
-        trajectory_execution: controllers and how motions are executed.
-        planning_scene_monitor: what of the planning scene is published.
-        sensors_3d: sensors of the octomap.
-        move_group_capabilities: capabilities to add and to leave out; not part of `to_dict()`, as in MoveIt 2.
-        joint_limits: limits for planning.
-        moveit_cpp: parameters of MoveItCpp.
-        pilz_cartesian_limits: limits of the tool along lines and arcs.
+        package_path: Folder of the config package.
+        robot_description: URDF, by parameter name.
+        robot_description_semantic: SRDF, by parameter name.
+        robot_description_kinematics: Settings of the kinematics solvers, by group.
+        planning_pipelines: Parameters `planning_pipelines/<name>/...` and `default_planning_pipeline`.
+        trajectory_execution: Controllers, and settings of the execution.
+        planning_scene_monitor: Settings for publishing the planning scene.
+        sensors_3d: Sensors of the octomap.
+        move_group_capabilities: Capabilities to add and to disable; not part of `to_dict()`, as in MoveIt 2.
+        joint_limits: Joint limits for planning.
+        moveit_cpp: Parameters of MoveItCpp.
+        pilz_cartesian_limits: Limits of the tool along lines and arcs.
     """
 
     package_path: Path | None = None
@@ -48,7 +48,7 @@ class MoveItConfigs:
     pilz_cartesian_limits: Parameters = field(default_factory=dict)
 
     def to_dict(self) -> Parameters:
-        """Returns all sections as one dictionary; a mapping that two of them have holds the entries of both."""
+        """Returns all sections as one dictionary; mappings with the same name are merged."""
         parameters: Parameters = {}
         for section in (
             self.robot_description,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads a config package in the Setup Assistant's layout, step by step: MoveIt 2's builder for ROS 1.
+"""Loads a config package in the Setup Assistant's layout step by step, as MoveIt 2's builder for ROS 1.
 
     moveit_config = (
         MoveItConfigsBuilder("my_robot", package_name="my_robot_moveit_config")
@@ -9,7 +9,7 @@
     )
     parameters = moveit_config.to_dict()
 
-What no step asks for is loaded from the file where the Setup Assistant puts it; the package's README lists the files.
+Parameters without a step are loaded from the Setup Assistant's default file; the package's README lists the files.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """Finds the config package and the robot's URDF and SRDF.
 
         Args:
-            robot_name: the package is `<robot_name>_moveit_config`, and files of this name are looked for in it.
-            robot_description: parameter of the URDF; the others are called after it.
-            package_name: the config package, if it has another name.
+            robot_name: Name of the robot; the package is `<robot_name>_moveit_config`, with files of this name.
+            robot_description: Parameter of the URDF, and prefix of the other parameters.
+            package_name: Name of the config package, if different.
 
         Raises:
-            ParameterFileError: the package is not found, or its `.setup_assistant` cannot be read.
+            ParameterFileError: The package is not found, or its `.setup_assistant` cannot be read.
         """
         super().__init__(package_name or f"{robot_name}_moveit_config")
         self._robot_name = robot_name
@@ -74,7 +74,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         self._urdf_mappings: dict[Any, Any] = {}
 
     def _guessed(self, name: str, kind: str, looked_for: Path | None = None) -> Path:
-        """Returns where a file is expected that nothing names, and warns where its name was looked for."""
+        """Returns the expected path of a file that is not named anywhere, and logs the searched locations."""
         places = [*([str(looked_for)] if looked_for else []), f"section {kind} of {FILE_NAME}"]
         LOGGER.warning(
             "%s: no %s found (looked for %s); using %s", self._package_path, kind, " and ".join(places), CONFIG / name
@@ -84,15 +84,15 @@ class MoveItConfigsBuilder(ParameterBuilder):
     def robot_description(self, file_path: Path | str | None = None, mappings: Mappings | None = None) -> Self:
         """Loads the URDF.
 
+        If the file does not exist, a warning is logged, and another node must set the description.
+
         Args:
-            file_path: another one than `config/<robot_name>.urdf.xacro` or the one `.setup_assistant` names.
-            mappings: values of the xacro arguments, texts or launch substitutions; without any, `xacro_args` of
+            file_path: Path of the file; by default `config/<robot_name>.urdf.xacro` or the file in `.setup_assistant`.
+            mappings: Values of the xacro arguments, as texts or launch substitutions; by default `xacro_args` of
                 `.setup_assistant`.
 
-        A file that does not exist is a warning: the description is then expected from another source.
-
         Raises:
-            ParameterFileError: the package of the URDF is not found, or xacro cannot expand the file.
+            ParameterFileError: The package of the URDF is not found, or xacro cannot expand the file.
         """
         if file_path is not None:
             path = self._package_path / file_path
@@ -108,7 +108,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
             text = _expanded(path, arguments)
         except ParameterBuilderFileNotFoundError as error:
             LOGGER.warning(
-                "%s; the robot description is not loaded: somebody else has to set the parameter %s",
+                "%s; the robot description is not loaded: another node has to set the parameter %s",
                 error,
                 self._description,
             )
@@ -120,15 +120,15 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """Loads the SRDF.
 
         Args:
-            file_path: another one than `.setup_assistant` names.
-            mappings: values of the xacro arguments; without any, those that `robot_description` was given before, or
-                else those of the package's launch files and `xacro_args` of `.setup_assistant`.
+            file_path: Path of the file; by default the file in `.setup_assistant`.
+            mappings: Values of the xacro arguments; by default the values of a previous step `robot_description`, or
+                otherwise the values in the package's launch files and `xacro_args` of `.setup_assistant`.
 
         Raises:
-            ParameterBuilderFileNotFoundError: there is no such file.
-            ParameterFileError: xacro cannot expand it.
+            ParameterBuilderFileNotFoundError: The file does not exist.
+            ParameterFileError: xacro cannot expand the file.
         """
-        path = self._package_path / file_path if file_path else _or_its_xacro(self._package_path / self._srdf)
+        path = self._package_path / file_path if file_path else _existing_or_xacro(self._package_path / self._srdf)
         arguments = _texts(mappings or {}) or _known_texts(self._urdf_mappings)
         if not mappings and not self._urdf_mappings:
             arguments = {**self._yaml.xacro_arguments(path.name), **self._setup.xacro_arguments}
@@ -136,18 +136,18 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return self
 
     def robot_description_kinematics(self, file_path: Path | str | None = None) -> Self:
-        """Loads the settings of inverse kinematics: `config/kinematics.yaml`."""
+        """Loads the settings of the kinematics solvers, by default `config/kinematics.yaml`."""
         content = self._content(file_path, "kinematics.yaml")
         self._configs.robot_description_kinematics = {f"{self._description}_kinematics": content}
         return self
 
     def joint_limits(self, file_path: Path | str | None = None) -> Self:
-        """Loads the limits for planning: `config/joint_limits.yaml`."""
+        """Loads the joint limits for planning, by default `config/joint_limits.yaml`."""
         self._configs.joint_limits = {f"{self._description}_planning": self._content(file_path, "joint_limits.yaml")}
         return self
 
     def moveit_cpp(self, file_path: Path | str | None = None) -> Self:
-        """Loads parameters of MoveItCpp: `config/moveit_cpp.yaml`."""
+        """Loads the parameters of MoveItCpp, by default `config/moveit_cpp.yaml`."""
         self._configs.moveit_cpp = self._content(file_path, "moveit_cpp.yaml")
         return self
 
@@ -155,13 +155,13 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """Loads the controllers that execute motions.
 
         Args:
-            file_path: their file; without one, see `choose_controllers_file`.
-            moveit_manage_controllers: whether controllers may be started and stopped as motions need them.
+            file_path: Path of the file; by default the result of `choose_controllers_file`.
+            moveit_manage_controllers: Whether move_group may start and stop controllers as needed for a motion.
 
         Raises:
-            ParameterBuilderFileNotFoundError: there is no such file.
-            ParameterFileError: the file cannot be used.
-            RuntimeError: several files might be meant.
+            ParameterBuilderFileNotFoundError: The file does not exist.
+            ParameterFileError: The file is invalid.
+            RuntimeError: The file is ambiguous.
         """
         path = (
             choose_controllers_file(self._package_path / CONFIG, self._robot_name, self._yaml.load)
@@ -181,7 +181,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         publish_robot_description: bool = False,
         publish_robot_description_semantic: bool = False,
     ) -> Self:
-        """Sets which parts of the planning scene move_group publishes.
+        """Sets which parts of the planning scene move_group publishes, optionally with the robot's descriptions.
 
         Args:
             publish_planning_scene: Whether to publish changes of the planning scene.
@@ -204,7 +204,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return self
 
     def sensors_3d(self, file_path: Path | str | None = None) -> Self:
-        """Loads the octomap's sensors: `config/sensors_3d.yaml`, if it exists and its first sensor is not empty."""
+        """Loads the sensors of the octomap, by default `config/sensors_3d.yaml`, unless the first sensor is empty."""
         path = self._package_path / (file_path or CONFIG / "sensors_3d.yaml")
         if file_path is not None:
             raise_if_file_not_found(path)
@@ -220,17 +220,17 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """Loads planning pipelines.
 
         Args:
-            default_planning_pipeline: the one of requests that name none; without it `ompl`, or else the first.
-            pipelines: their names; None: every `config/*_planning.yaml`.
-            load_all: with None, the packaged pipelines as well.
+            default_planning_pipeline: Pipeline of requests without a pipeline; by default `ompl`, or else the first.
+            pipelines: Names of the pipelines; None for every `config/*_planning.yaml`.
+            load_all: Whether to add the packaged pipelines if `pipelines` is None.
 
         Raises:
-            RuntimeError: the default is none of them.
-            ParameterFileError: a pipeline has no file or no planner.
+            RuntimeError: The default pipeline is not loaded.
+            ParameterFileError: A pipeline has no file or no planner.
         """
         defaults = package_folder("moveit_configs_utils") / "default_configs"
         files = PipelineFiles(self._package_path, defaults, self._yaml)
-        loaded = files.load(files.names(load_all) if pipelines is None else pipelines, leave_out=pipelines is None)
+        loaded = files.load(files.names(load_all) if pipelines is None else pipelines, skip_invalid=pipelines is None)
         default = default_planning_pipeline or (OMPL if OMPL in loaded else next(iter(loaded), ""))
         if default not in loaded:
             raise RuntimeError(
@@ -240,9 +240,9 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return self
 
     def pilz_cartesian_limits(self, file_path: Path | str | None = None) -> Self:
-        """Loads limits of the tool along lines and arcs: `config/pilz_cartesian_limits.yaml`.
+        """Loads limits of the tool along lines and arcs, by default `config/pilz_cartesian_limits.yaml`.
 
-        `config/cartesian_limits.yaml`, its name in MoveIt 1, is taken, with a warning, where there is no other.
+        If this file is missing, `config/cartesian_limits.yaml`, its name in MoveIt 1, is loaded with a warning.
         """
         old = CONFIG / "cartesian_limits.yaml"
         if (self._package_path / old).is_file():
@@ -254,20 +254,20 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return self
 
     def to_moveit_configs(self) -> MoveItConfigs:
-        """Returns everything, after loading what no step has loaded; moveit_cpp is loaded by its step only.
+        """Returns all parameters, after loading the missing parts; moveit_cpp is only loaded by its step.
 
         Raises:
-            ParameterBuilderFileNotFoundError: the SRDF does not exist.
-            ParameterFileError: a file cannot be used.
-            RuntimeError: several files of controllers might be meant.
+            ParameterBuilderFileNotFoundError: The SRDF does not exist.
+            ParameterFileError: A file is invalid.
+            RuntimeError: The controller file is ambiguous.
         """
         configs = self._configs
         self._load_missing("robot_description", "robot_description_semantic")
         if not configs.robot_description_kinematics:
-            _if_present(self.robot_description_kinematics, "no inverse kinematics: goals can be given for joints only")
+            _if_present(self.robot_description_kinematics, "no inverse kinematics: only joint goals are possible")
         self._load_missing("planning_pipelines", "trajectory_execution", "planning_scene_monitor", "sensors_3d")
         if not configs.joint_limits:
-            _if_present(self.joint_limits, "the limits of the URDF alone count")
+            _if_present(self.joint_limits, "only the limits of the URDF apply")
         if PILZ in configs.planning_pipelines["planning_pipelines"] and not configs.pilz_cartesian_limits:
             _if_present(self.pilz_cartesian_limits, "LIN and CIRC cannot be planned")
         return configs
@@ -276,13 +276,13 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """Returns all parameters as one dictionary.
 
         Args:
-            include_moveit_configs: False leaves those of ParameterBuilder's own steps.
+            include_moveit_configs: False for only the parameters of ParameterBuilder's steps.
         """
         own = super().to_dict()
         return {**own, **self.to_moveit_configs().to_dict()} if include_moveit_configs else own
 
     def _load_missing(self, *parts: str) -> None:
-        """Takes the steps, in this order, of the parts that no step has loaded; part and step have the same name."""
+        """Runs the steps of missing parts in this order; a part and its step have the same name."""
         for part in parts:
             if not getattr(self._configs, part):
                 getattr(self, part)()
@@ -292,7 +292,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
 
 
 def _if_present(load: Callable[[], object], consequence: str) -> None:
-    """Loads a file that a robot can do without; where it does not exist, a warning says what follows from that."""
+    """Loads an optional file; if missing, a warning with the consequence is logged."""
     try:
         load()
     except ParameterBuilderFileNotFoundError as error:
@@ -300,11 +300,13 @@ def _if_present(load: Callable[[], object], consequence: str) -> None:
 
 
 def _expanded(path: Path, mappings: Mappings) -> Any:
-    """Returns what a xacro file expands to; something that expands it at launch, where an argument is known only then.
+    """Returns the expanded text of a xacro file, or a value that is expanded during the launch.
+
+    The expansion is deferred if an argument is a launch substitution.
 
     Raises:
-        ParameterBuilderFileNotFoundError: there is no such file.
-        ParameterFileError: xacro cannot expand it.
+        ParameterBuilderFileNotFoundError: The file does not exist.
+        ParameterFileError: xacro cannot expand the file.
     """
     raise_if_file_not_found(path)
     if all(isinstance(item, str) for pair in mappings.items() for item in pair):
@@ -316,8 +318,8 @@ def _expanded(path: Path, mappings: Mappings) -> Any:
     return ParameterValue(Xacro(str(path), mappings=mappings), value_type=str)
 
 
-def _or_its_xacro(path: Path) -> Path:
-    """Returns a file; where it does not exist the xacro file it is made from, with a warning, if that one does."""
+def _existing_or_xacro(path: Path) -> Path:
+    """Returns the file, or, with a warning, the xacro file of the same name if the file is missing."""
     xacro_file = path.with_name(f"{path.name}.xacro")
     if path.is_file() or not xacro_file.is_file():
         return path
@@ -330,12 +332,12 @@ def _texts(mappings: Mappings) -> dict[Any, Any]:
 
 
 def _known_texts(mappings: Mappings) -> dict[str, str]:
-    """Returns the entries that are known before the launch file runs."""
+    """Returns the entries that are known before the launch."""
     return {name: value for name, value in mappings.items() if isinstance(name, str) and isinstance(value, str)}
 
 
 def _text(value: Any) -> Any:
-    """Returns a plain value as text, as a launch file writes it, and a substitution as it is."""
+    """Converts a plain value to a text for a launch file; substitutions are not changed."""
     if isinstance(value, bool):
         return str(value).lower()
     return str(value) if isinstance(value, int | float | Path) else value

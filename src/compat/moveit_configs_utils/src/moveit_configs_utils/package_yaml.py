@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads YAML files of a config package, and fills in `$(arg NAME)` as the package's launch files would.
+"""Loads YAML files of a config package, with `$(arg NAME)` replaced as by the package's launch files.
 
-Packages of MoveIt 1 may write `$(arg arm_id)_joint1` in their YAML files: their launch files load these with
-`subst_value="true"`, and say what the argument is by default.
+MoveIt 1 packages may use `$(arg arm_id)_joint1` in YAML files, which their launch files load with `subst_value="true"`.
+The launch files define the defaults of the arguments.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class PackageYaml:
     """Loads YAML files.
 
     Attributes:
-        package: folder of the config package.
-        arguments: values that come before the defaults of its launch files.
+        package: Folder of the config package.
+        arguments: Values that override the defaults in the launch files.
     """
 
     package: Path
@@ -36,11 +36,11 @@ class PackageYaml:
     def load(self, path: Path) -> dict[str, Any]:
         """Returns the parameters in a file.
 
-        An argument that nothing gives a value stays as it is, with a warning.
+        Arguments without a value are kept, with a warning.
 
         Raises:
-            ParameterBuilderFileNotFoundError: there is no such file.
-            ParameterFileError: it is not valid YAML, or no mapping.
+            ParameterBuilderFileNotFoundError: The file does not exist.
+            ParameterFileError: The file is not valid YAML or not a mapping.
         """
         text = load_file(path)
         if ARGUMENT.search(text):
@@ -49,7 +49,7 @@ class PackageYaml:
             if unknown:
                 LOGGER.warning(
                     "%s: no value for %s (looked in the xacro arguments of robot_description and in the defaults of "
-                    "launch/*); it stays as it is",
+                    "launch/*); the text is kept",
                     path,
                     ", ".join(f"$(arg {name})" for name in unknown),
                 )
@@ -57,7 +57,7 @@ class PackageYaml:
         return parse_parameters(text, path)
 
     def values(self) -> dict[str, str]:
-        """Returns the values of arguments: those given, then plain defaults in the package's launch files."""
+        """Returns the values of arguments: given values, and plain defaults in the package's launch files."""
         result = dict(self.arguments)
         for root in self._roots_of_launch_files():
             for argument in root.findall("arg"):
@@ -67,7 +67,7 @@ class PackageYaml:
         return {"fake_execution_type": "interpolate", **result}
 
     def xacro_arguments(self, file_name: str) -> dict[str, str]:
-        """Returns the arguments with which the package's launch files expand a xacro file."""
+        """Returns the arguments of a xacro file in the package's launch files."""
         return xacro_arguments(self._roots_of_launch_files(), file_name, self.values())
 
     def _roots_of_launch_files(self) -> Iterator[Element]:
@@ -75,4 +75,4 @@ class PackageYaml:
             try:
                 yield parse(path.read_bytes(), str(path))
             except (XmlError, OSError) as error:
-                LOGGER.warning("%s: defaults of its arguments are not known: %s", path, error)
+                LOGGER.warning("%s: the defaults of its arguments are unknown: %s", path, error)

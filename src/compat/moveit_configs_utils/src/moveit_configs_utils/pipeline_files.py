@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the planning pipelines of a config package, and the packaged ones, and loads their parameters."""
+"""Finds the planning pipelines of a config package and the packaged pipelines, and loads their parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 from launch_param_builder import ParameterFileError, load_yaml
 
 from moveit_configs_utils.package_yaml import PackageYaml
-from moveit_configs_utils.ros1_pipelines import COMPLETED, completed, ros1_pipeline
+from moveit_configs_utils.ros1_pipelines import KEYS_WITH_DEFAULTS, ros1_pipeline, with_missing_keys
 from moveit_configs_utils.ros_launch_files import launch_file_parameters
 
 LOGGER = logging.getLogger(__name__)
@@ -22,13 +22,13 @@ OMPL = "ompl"
 
 @dataclass(frozen=True, slots=True)
 class PipelineFiles:
-    """Where the parameters of pipelines stand.
+    """Locations of pipeline parameters.
 
     Attributes:
-        package: folder of the config package: `config/<name>_planning.yaml`, and in packages of MoveIt 1 also
+        package: Folder of the config package, with `config/<name>_planning.yaml`, and in MoveIt 1 packages also
             `launch/<name>_planning_pipeline.launch.xml`.
-        defaults: folder with what serves packages that have neither.
-        yaml: loads the package's YAML files.
+        defaults: Folder of the packaged pipelines.
+        yaml: Loader of the package's YAML files.
     """
 
     package: Path
@@ -36,29 +36,29 @@ class PipelineFiles:
     yaml: PackageYaml
 
     def names(self, with_defaults: bool) -> list[str]:
-        """Returns the pipelines with a YAML file in the package, then those with a packaged one."""
+        """Returns the pipelines with a YAML file in the package, followed by the packaged pipelines."""
         folders = [self.package / "config", *([self.defaults] if with_defaults else [])]
         files = [path for folder in folders for path in sorted(folder.glob(f"*{SUFFIX}"))]
         return list(dict.fromkeys(path.name.removesuffix(SUFFIX) for path in files))
 
-    def load(self, names: Sequence[str], leave_out: bool) -> dict[str, dict[str, Any]]:
+    def load(self, names: Sequence[str], skip_invalid: bool) -> dict[str, dict[str, Any]]:
         """Returns the parameters of pipelines, by name.
 
         Args:
-            names: of the pipelines.
-            leave_out: a pipeline without a planner is left out with a warning, instead of being an error.
+            names: Names of the pipelines.
+            skip_invalid: Whether a pipeline without a planner is left out with a warning, instead of an error.
 
         Raises:
-            ParameterFileError: there is no file of a pipeline, or it names no planner.
+            ParameterFileError: A pipeline has no file or no planner.
         """
         pipelines = {name: self._load(name) for name in names}
         for name in [name for name, item in pipelines.items() if not item.get("planning_plugin")]:
             reason = (
                 f"pipeline '{name}': no planning_plugin; looked in {', '.join(str(path) for path in self._files(name))}"
             )
-            if not leave_out:
+            if not skip_invalid:
                 raise ParameterFileError(reason)
-            LOGGER.warning("%s; it is left out", reason)
+            LOGGER.warning("%s; the pipeline is left out", reason)
             del pipelines[name]
         return pipelines
 
@@ -76,9 +76,11 @@ class PipelineFiles:
             found = ros1_pipeline(self.yaml.load(own), own)
         if "planning_plugin" not in found and launch_file.is_file():
             parameters = launch_file_parameters(launch_file, self.yaml.values())
-            found = completed(found, ros1_pipeline(parameters, launch_file), ())
+            found = with_missing_keys(found, ros1_pipeline(parameters, launch_file), ())
         if default.is_file():
-            found = completed(found, ros1_pipeline(load_yaml(default), default), COMPLETED if found else ())
+            found = with_missing_keys(
+                found, ros1_pipeline(load_yaml(default), default), KEYS_WITH_DEFAULTS if found else ()
+            )
         if name == OMPL and "planner_configs" not in found:
-            found = completed(found, load_yaml(self.defaults / "ompl_defaults.yaml"), ())
+            found = with_missing_keys(found, load_yaml(self.defaults / "ompl_defaults.yaml"), ())
         return found

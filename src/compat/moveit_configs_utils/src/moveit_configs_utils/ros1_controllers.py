@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses the file with the controllers of a robot, and turns what it says into parameters of ROS 1's move_group."""
+"""Selects the controller file of a robot, and converts its content to parameters of ROS 1's move_group."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from launch_param_builder import ParameterFileError
 LOGGER = logging.getLogger(__name__)
 SIMPLE, FAKE = "moveit_simple_controller_manager", "moveit_fake_controller_manager"
 PLUGINS = {SIMPLE: f"{SIMPLE}/MoveItSimpleControllerManager", FAKE: f"{FAKE}/MoveItFakeControllerManager"}
-# Controller managers that only MoveIt 2 has, and MoveIt 1's name of what they do.
+# MoveIt 1's names of controller managers that only exist in MoveIt 2.
 ROS_CONTROL = "moveit_ros_control_interface"
 RENAMED = {
     f"{ROS_CONTROL}/Ros2ControlManager": f"{ROS_CONTROL}::MoveItControllerManager",
@@ -23,28 +23,28 @@ RENAMED = {
 CONTROLLER_TYPES = {"ParallelGripperCommand": "GripperCommand"}
 FILE_NAME = re.compile(r"^(.*)_controllers\.yaml$")
 PUBLIC_ORDER = ("moveit", "moveit2")
-# Files of MoveIt 1's Setup Assistant, those of real controllers first; "" is controllers.yaml.
+# Files of MoveIt 1's Setup Assistant in order of preference; "" is controllers.yaml.
 MOVEIT1_ORDER = ("simple_moveit", "", "ros")
-PRETENDED = "fake"
+FAKE_NAME = "fake"
 
 
 def choose_controllers_file(folder: Path, robot_name: str, load: Callable[[Path], Mapping[str, Any]]) -> Path | None:
-    """Returns the file of a config folder that says which controllers execute motions.
+    """Returns the file in a config folder that lists the controllers for execution.
 
-    The only `*_controllers.yaml`; of several `moveit_`, `moveit2_` or `<robot_name>_controllers.yaml`, and, in packages
-    of MoveIt 1, the first of `simple_moveit_controllers.yaml`, `controllers.yaml` and `ros_controllers.yaml` that lists
-    any, or `fake_controllers.yaml` where no other file does.
+    A single `*_controllers.yaml` is selected. Otherwise, the file is `moveit_`, `moveit2_` or
+    `<robot_name>_controllers.yaml`. In MoveIt 1 packages, it is the first of `simple_moveit_controllers.yaml`,
+    `controllers.yaml` and `ros_controllers.yaml` with controllers, or else `fake_controllers.yaml`.
 
     Args:
-        folder: the config folder.
-        robot_name: name given to the builder.
-        load: loads one of the files.
+        folder: Config folder.
+        robot_name: Name of the robot in the builder.
+        load: Function that loads a file.
 
     Returns:
-        The file, or None, with a warning, where there is none of that name.
+        The file; None, with a warning, if no file exists.
 
     Raises:
-        RuntimeError: several files, and none of these names among them; lists them.
+        RuntimeError: Several files exist, and none has these names; the message lists the files.
     """
     files = {match[1]: path for path in _files(folder) if (match := FILE_NAME.match(path.name))}
     if (folder / "controllers.yaml").is_file():
@@ -58,14 +58,14 @@ def choose_controllers_file(folder: Path, robot_name: str, load: Callable[[Path]
         if name in files:
             return files[name]
     listing = [name for name, path in files.items() if lists_controllers(load(path))]
-    for name in (*MOVEIT1_ORDER, *([PRETENDED] if listing == [PRETENDED] else [])):
+    for name in (*MOVEIT1_ORDER, *([FAKE_NAME] if listing == [FAKE_NAME] else [])):
         if name in listing:
             return files[name]
     options = "\n - ".join(path.name for path in files.values())
     raise RuntimeError(
-        f"trajectory_execution: {folder} has several files of controllers and none of the names "
-        f"{', '.join(f'{name}_controllers.yaml' for name in (*PUBLIC_ORDER, robot_name))}: give the one to load as "
-        f"file_path. Options:\n - {options}"
+        f"trajectory_execution: {folder} has several controller files and none with a default name "
+        f"({', '.join(f'{name}_controllers.yaml' for name in (*PUBLIC_ORDER, robot_name))}); give file_path. "
+        f"Options:\n - {options}"
     )
 
 
@@ -74,7 +74,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def lists_controllers(content: Mapping[str, Any]) -> bool:
-    """Whether the content of a file names controllers, in MoveIt 1's form or in MoveIt 2's."""
+    """Returns whether a file lists controllers, in the format of MoveIt 1 or MoveIt 2."""
     return bool(content.get("controller_list")) or any(_listed_names(content, manager) for manager in PLUGINS)
 
 
@@ -85,16 +85,16 @@ def _listed_names(content: Mapping[str, Any], manager: str) -> Sequence[Any]:
 
 
 def ros1_controllers(content: Mapping[str, Any], where: Path) -> dict[str, Any]:
-    """Returns the parameters of a file with `controller_list` and `moveit_controller_manager` as ROS 1 has them.
+    """Returns the parameters of a file with `controller_list` and `moveit_controller_manager` of ROS 1.
 
-    The names of the controllers also stand in `moveit_simple_controller_manager/controller_names`, MoveIt 2's form.
+    The names of the controllers are also in `moveit_simple_controller_manager/controller_names`, as in MoveIt 2.
 
     Args:
-        content: of the file.
-        where: the file, for messages.
+        content: Content of the file.
+        where: Path of the file for messages.
 
     Raises:
-        ParameterFileError: a listed controller is not described, or the list is none.
+        ParameterFileError: A listed controller has no parameters, or the list is invalid.
     """
     result = dict(content)
     manager = next((name for name in PLUGINS if _listed_names(content, name)), SIMPLE)
@@ -104,13 +104,13 @@ def ros1_controllers(content: Mapping[str, Any], where: Path) -> dict[str, Any]:
         result["controller_list"] = _controller_list(content[manager], manager, where)
     entries = _checked_list(result.get("controller_list", []), where)
     if plugin == PLUGINS[FAKE]:
-        LOGGER.warning("%s: its controllers are fake ones: motions are not executed by a robot or a simulation", where)
+        LOGGER.warning("%s: the controllers are fake controllers; no robot or simulation executes the motions", where)
     if not entries and plugin.startswith(ROS_CONTROL):
-        return result  # it asks the controller manager which controllers there are
+        return result  # the plugin gets the controllers from the controller manager
     if not entries:
         LOGGER.warning(
-            "%s: lists no controllers (looked for controller_list and %s/controller_names): motions can be planned, "
-            "not executed",
+            "%s: lists no controllers (looked for controller_list and %s/controller_names); motions can be planned, "
+            "but not executed",
             where,
             SIMPLE,
         )
@@ -126,8 +126,8 @@ def _controller_list(block: Mapping[str, Any], manager: str, where: Path) -> lis
     if missing:
         described = [key for key, value in block.items() if isinstance(value, Mapping)]
         raise ParameterFileError(
-            f"{where}: {manager}/controller_names has {', '.join(missing)}, of which nothing else is said; described "
-            f"are {', '.join(described) or 'none'}"
+            f"{where}: {manager}/controller_names has {', '.join(missing)} without parameters; controllers with "
+            f"parameters: {', '.join(described) or 'none'}"
         )
     return [{"name": str(name), **block[name]} for name in block["controller_names"]]
 
@@ -135,7 +135,7 @@ def _controller_list(block: Mapping[str, Any], manager: str, where: Path) -> lis
 def _checked_list(entries: Any, where: Path) -> list[dict[str, Any]]:
     if isinstance(entries, list) and all(isinstance(entry, dict) and "name" in entry for entry in entries):
         return entries
-    raise ParameterFileError(f"{where}: controller_list is {entries!r}; a list of mappings with a name each is needed")
+    raise ParameterFileError(f"{where}: controller_list is {entries!r}; expected a list of mappings with a name each")
 
 
 def _without_name(entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the parameters that a launch file of roslaunch sets: MoveIt 1 keeps a pipeline's planner and adapters there."""
+"""Reads the parameters in a roslaunch file, in which MoveIt 1 keeps a pipeline's planner and adapters."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ LOGGER = logging.getLogger(__name__)
 
 
 def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
-    """Returns the parameters that a launch file of roslaunch sets with its default arguments, as nested mappings.
+    """Returns the parameters that a roslaunch file sets with its default arguments, as nested mappings.
 
-    Nothing is started, and no master is needed.
+    No node is started, and no master is needed.
 
     Args:
-        path: the launch file.
-        values: of arguments that have no default there; an including file may pass some it does not declare.
+        path: Path of the launch file.
+        values: Values of arguments without a default, possibly including undeclared arguments.
 
     Returns:
-        The parameters; none, with a warning, where roslaunch refuses the file.
+        The parameters; empty, with a warning, if roslaunch rejects the file.
     """
     config = roslaunch.config.ROSLaunchConfig()
     try:
@@ -39,14 +39,14 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
         given = [f"{name}:={values[name]}" for name in _arguments_without_value(path) if name in values]
         loader.load(str(path), config, argv=given, verbose=False)
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError, OSError) as error:
-        reason = str(error).partition("\nROS path")[0]  # rospkg lists the whole search path behind it
-        LOGGER.warning("%s: its parameters are left out, roslaunch cannot load it: %s", path, reason)
+        reason = str(error).partition("\nROS path")[0]  # without the search path that rospkg appends
+        LOGGER.warning("%s: its parameters are left out, because roslaunch cannot load it: %s", path, reason)
         return {}
     return nested({name: parameter.value for name, parameter in sorted(config.params.items())})
 
 
 def _arguments_without_value(path: Path) -> list[str]:
-    """Returns the arguments that a launch file declares or uses, and gives neither a value nor a default."""
+    """Returns the arguments without value or default that a launch file declares or uses."""
     root = read(path)
     declared = [item for item in root.iter("arg") if item.getparent().tag != "include"]
     used = ARGUMENT.findall(to_text(root))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads `.setup_assistant`: which URDF and SRDF a config package was made from."""
+"""Reads `.setup_assistant`, which names the URDF and SRDF of a config package."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ FILE_NAME = ".setup_assistant"
 
 @dataclass(frozen=True, slots=True)
 class SetupAssistantFile:
-    """What the file says; all of it may be absent.
+    """Contents of the file; all values are optional.
 
     Attributes:
-        urdf_package: ROS package that holds the URDF; empty for a file outside every package.
-        urdf_path: of the URDF in that package; absolute where there is none.
-        xacro_arguments: arguments the URDF's xacro file is expanded with.
-        srdf_path: of the SRDF in the config package.
+        urdf_package: ROS package of the URDF; empty for a file outside of packages.
+        urdf_path: Path of the URDF in the package; absolute without a package.
+        xacro_arguments: Arguments of the URDF's xacro file.
+        srdf_path: Path of the SRDF in the config package.
     """
 
     urdf_package: str = ""
@@ -33,14 +33,14 @@ class SetupAssistantFile:
 
 
 def read_setup_assistant_file(package_path: Path, values: Mapping[str, str]) -> SetupAssistantFile:
-    """Reads the file of a config package; an empty result where there is none.
+    """Reads the file of a config package; returns an empty result if the file does not exist.
 
     Args:
         package_path: Folder of the package.
         values: Values of the arguments of the package's launch files, for `$(arg NAME)`.
 
     Raises:
-        ParameterFileError: it is not as the Setup Assistant writes it.
+        ParameterFileError: The file does not have the format of the Setup Assistant.
     """
     path = package_path / FILE_NAME
     if not path.exists():
@@ -48,7 +48,7 @@ def read_setup_assistant_file(package_path: Path, values: Mapping[str, str]) -> 
     config = _section(load_yaml(path), "moveit_setup_assistant_config", path)
     urdf, srdf = (_section(config, key if key in config else key.upper(), path) for key in ("urdf", "srdf"))
     if urdf and not urdf.get("relative_path"):
-        raise ParameterFileError(f"{path}: section urdf has {', '.join(urdf)}; needed are package and relative_path")
+        raise ParameterFileError(f"{path}: section urdf has {', '.join(urdf)}; expected package and relative_path")
     return SetupAssistantFile(
         str(urdf.get("package", "")),
         _relative(urdf) if urdf.get("package") else str(urdf.get("relative_path", "")),
@@ -60,7 +60,7 @@ def read_setup_assistant_file(package_path: Path, values: Mapping[str, str]) -> 
 def _section(content: Mapping[str, Any], key: str, path: Path) -> Mapping[str, Any]:
     section = content.get(key, {})
     if not isinstance(section, Mapping):
-        raise ParameterFileError(f"{path}: {key} is {section!r}; a mapping is needed")
+        raise ParameterFileError(f"{path}: {key} is {section!r}; expected a mapping")
     return section
 
 
@@ -69,14 +69,14 @@ def _relative(section: Mapping[str, Any]) -> str:
 
 
 def _arguments(text: str, values: Mapping[str, str], path: Path) -> dict[str, str]:
-    """Reads `name:=value name:=value`; options of the xacro command such as --inorder have no effect.
+    """Parses `name:=value name:=value`; options of the xacro command such as --inorder have no effect.
 
-    An argument whose value is not known, such as `$(arg NAME)` that no launch file has, keeps the xacro file's default.
+    An argument with an unknown value, such as an undefined `$(arg NAME)`, keeps the default of the xacro file.
     """
     words = command_words(text, values)
     wrong = [word for word in words if ":=" not in word and UNKNOWN not in word and not word.startswith("-")]
     if wrong:
         raise ParameterFileError(
-            f"{path}: xacro_args has '{' '.join(wrong)}'; every argument is needed as name:=value, separated by spaces"
+            f"{path}: xacro_args has '{' '.join(wrong)}'; expected arguments name:=value, separated by spaces"
         )
     return known_arguments(words)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Substitutions of launch files that config packages need."""
+"""Launch substitutions for config packages."""
 
 from moveit_configs_utils.substitutions.xacro import Xacro
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Expands a xacro file when a launch file runs, with arguments that are known only then."""
+"""Expands a xacro file during the launch, with arguments that may be substitutions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from launch_param_builder import load_xacro
 
 
 class Xacro(Substitution):
-    """The XML that a xacro file expands to; file, names and values of its arguments may be substitutions."""
+    """XML of an expanded xacro file; path, names and values of its arguments may be substitutions."""
 
     def __init__(
         self,
@@ -20,11 +20,11 @@ class Xacro(Substitution):
         *,
         mappings: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
     ) -> None:
-        """Stores what is to be expanded.
+        """Stores the file and its arguments.
 
         Args:
-            file_path: the xacro file.
-            mappings: values of its arguments.
+            file_path: Path of the xacro file.
+            mappings: Values of its arguments, by name.
         """
         super().__init__()
         self._file_path = normalize_to_list_of_substitutions(file_path)
@@ -32,21 +32,21 @@ class Xacro(Substitution):
 
     @property
     def file_path(self) -> list[Substitution]:
-        """The file, as substitutions."""
+        """Returns the path of the file, as substitutions."""
         return self._file_path
 
     @property
     def mappings(self) -> dict[SomeSubstitutionsType, SomeSubstitutionsType]:
-        """Values of the arguments."""
+        """Returns the values of the arguments."""
         return self._mappings
 
     def describe(self) -> str:
-        """Describes it for messages."""
+        """Returns a description for messages."""
         arguments = ", ".join(f"{_description(name)}:={_description(value)}" for name, value in self._mappings.items())
         return f"Xacro(file_path = {_description(self._file_path)}, mappings = {arguments})"
 
     def perform(self, context: LaunchContext) -> str:
-        """Returns the XML; raises what launch_param_builder.load_xacro raises."""
+        """Returns the XML; raises the exceptions of launch_param_builder.load_xacro."""
         mappings = {_text(context, name): _text(context, value) for name, value in self._mappings.items()}
         return load_xacro(Path(perform_substitutions(context, self._file_path)), mappings)
 
