@@ -147,7 +147,7 @@ def test_a_new_subscriber_gets_one_image_of_now_while_time_stands_still(simulati
 def test_time_goes_on_without_the_process_that_draws_and_the_log_says_so(simulation: Any) -> None:
     (pid,) = processes("camera_node")
     os.kill(pid, signal.SIGKILL)
-    until(lambda: "cameras are silent now" in simulation.log(), "a line in the log")
+    until(lambda: "cameras publish no more images" in simulation.log(), "a line in the log")
     before = rospy.get_time()
     until(lambda: rospy.get_time() > before + 0.2, "simulated time")
 

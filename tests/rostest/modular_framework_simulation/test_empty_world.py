@@ -97,7 +97,7 @@ def test_the_usual_world_has_a_floor_and_what_has_no_effect_is_named(ros_session
         ros_session.wait_for_service(f"/gazebo/{service}", 40.0)
     assert rospy.ServiceProxy("/gazebo/get_physics_properties", GetPhysicsProperties)().pause
     assert rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)().model_names == ["ground_plane"]
-    until(lambda: "without effect in this simulation: " in launch.log(), "the warning")
+    until(lambda: "arguments without effect in this simulation: " in launch.log(), "the warning")
     for each in ("recording:=true", "debug:=true", "physics:=ode", "extra_gazebo_args:=--seed 3"):
         assert each in launch.log()
     launch.stop()
@@ -142,7 +142,7 @@ def test_a_required_window_that_cannot_be_is_an_error(ros_session: Any, monkeypa
     monkeypatch.setitem(ros_session.env, "DISPLAY", "")
     launch = ros_session.launch(with_arguments(gui_required="true", server_required="true"))
     launch.wait(60.0)
-    assert "gui_required is true and there is no window" in launch.log()
+    assert "gui_required is true, but no window is available" in launch.log()
 
 
 def test_a_world_that_is_nowhere_is_named_with_the_places_looked_at(ros_session: Any) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every service and topic of gazebo_ros, once with good and once with bad input: the effect is seen, or the refusal.
+"""Calls every service and topic of gazebo_ros with valid and with invalid input, and checks the effect or the refusal.
 
-What was seen is the table in docs/reference/gazebo_interface.md. The last test compares the two; with the environment
-variable WRITE_GAZEBO_INTERFACE=1 it writes the page.
+The results form the tables in docs/reference/gazebo_interface.md. A test compares the page with the results; with the
+environment variable WRITE_GAZEBO_INTERFACE=1, the test writes the page.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def failed(name: str, kind: Any, *values: Any) -> str:
 
 
 def no_input() -> str:
-    return "takes no input"
+    return "no input"
 
 
 def at(x: float, y: float, z: float) -> Pose:
@@ -196,7 +196,7 @@ def spawn_sdf_model() -> str:
     found = state("ball").pose.position
     call("delete_model", srv.DeleteModel, "ball")
     assert (found.x, found.y, found.z) == pytest.approx((0, 2, 2.5))
-    return "the model is there, at its own pose in the given one in the reference frame"
+    return "the model exists; its own pose applies relative to the given pose in the reference frame"
 
 
 @service(srv.SpawnModel, lambda: refused(call("spawn_urdf_model", srv.SpawnModel, "x", BALL, "", Pose(), "")))
@@ -205,7 +205,7 @@ def spawn_urdf_model() -> str:
     mass = done(call("get_link_properties", srv.GetLinkProperties, "ball::body")).mass
     call("delete_model", srv.DeleteModel, "ball")
     assert mass == pytest.approx(0.3)
-    return "the model is there, with its mass"
+    return "the model exists, with its mass"
 
 
 @service(srv.SpawnModel, lambda: refused(call("spawn_gazebo_model", srv.SpawnModel, "cube", BALL, "", Pose(), "")))
@@ -213,7 +213,7 @@ def spawn_gazebo_model() -> str:
     done(call("spawn_gazebo_model", srv.SpawnModel, "ball", BALL, "", at(0, 2, 1), ""))
     assert "ball" in models()
     call("delete_model", srv.DeleteModel, "ball")
-    return "the model is there (deprecated name of spawn_sdf_model)"
+    return "the model exists (deprecated name of spawn_sdf_model)"
 
 
 @service(srv.DeleteModel, lambda: refused(call("delete_model", srv.DeleteModel, "mug")))
@@ -221,7 +221,7 @@ def delete_model() -> str:
     with spawned():
         done(call("delete_model", srv.DeleteModel, "ball"))
         assert "ball" not in models()
-    return "the model is gone"
+    return "the model no longer exists"
 
 
 @service(srv.GetModelState, lambda: refused(call("get_model_state", srv.GetModelState, "cube", "nowhere")))
@@ -229,7 +229,7 @@ def get_model_state() -> str:
     found = state("cube", "door::leaf")
     assert found.header.frame_id == "door::leaf"
     assert (found.pose.position.x, found.pose.position.z) == pytest.approx((-3.4, 0.0))
-    return "pose and twist as seen from a model or link"
+    return "pose and twist relative to a model or link"
 
 
 @service(
@@ -242,7 +242,7 @@ def set_model_state() -> str:
     found = state("cube")
     assert (found.pose.position.x, found.pose.position.z) == pytest.approx((3, 3))
     assert found.twist.linear.y == pytest.approx(0.5)
-    return "the model is there and moves like that"
+    return "the model has the given pose and twist"
 
 
 @service(srv.GetModelProperties, lambda: refused(call("get_model_properties", srv.GetModelProperties, "")))
@@ -250,7 +250,7 @@ def get_model_properties() -> str:
     found = done(call("get_model_properties", srv.GetModelProperties, "door"))
     assert (found.body_names, found.joint_names) == (["post", "leaf"], ["fast", "hinge"])
     assert (found.canonical_body_name, found.is_static) == ("post", False)
-    return "links, joints, shapes, whether it is static"
+    return "links, joints, shapes; whether the model is static"
 
 
 @service(
@@ -260,7 +260,7 @@ def get_model_properties() -> str:
 def set_model_configuration() -> str:
     done(call("set_model_configuration", srv.SetModelConfiguration, "door", "", ["hinge"], [0.5]))
     assert hinge().position == pytest.approx((0.5,), abs=1e-6)
-    return "the joints are there, read back before the answer"
+    return "the joints have the given positions before the service answers"
 
 
 # ---- links ----
@@ -271,7 +271,7 @@ def get_link_state() -> str:
     found = done(call("get_link_state", srv.GetLinkState, "door::leaf", "door::post")).link_state
     assert found.pose.position.x == pytest.approx(0.4)
     assert found.reference_frame == "door::post"
-    return "pose and twist as seen from a model or link"
+    return "pose and twist relative to a model or link"
 
 
 @service(
@@ -281,14 +281,14 @@ def get_link_state() -> str:
 def set_link_state() -> str:
     done(call("set_link_state", srv.SetLinkState, msg.LinkState("cube::link", at(1, 0, 0), Twist(), "cube::link")))
     assert state("cube").pose.position.x == pytest.approx(1)
-    return "the link is there, and with it its model"
+    return "the link has the given pose; its model moves with the link"
 
 
 @service(srv.GetLinkProperties, lambda: refused(call("get_link_properties", srv.GetLinkProperties, "link")))
 def get_link_properties() -> str:
     found = done(call("get_link_properties", srv.GetLinkProperties, "door::leaf"))
     assert (found.mass, found.ixx, found.gravity_mode) == (pytest.approx(0.5), pytest.approx(0.01), True)
-    return "mass, centre of mass, inertia, whether gravity acts"
+    return "mass, centre of mass, inertia; whether gravity acts"
 
 
 def set_mass(mass: float, gravity_mode: bool = True) -> Any:
@@ -313,7 +313,7 @@ def set_link_properties() -> str:
         assert state("cube").twist.linear.x == pytest.approx(0.125, rel=0.02)
     finally:
         done(set_mass(0.2))
-    return "four times the mass, a quarter of the acceleration"
+    return "a link with four times the mass has a quarter of the acceleration"
 
 
 def push(body: str, frame: str, force: float, duration_s: float, torque: float = 0.0) -> Any:
@@ -328,7 +328,7 @@ def apply_body_wrench() -> str:
     pass_time(0.3)
     found = state("cube").twist
     assert (found.linear.x, found.angular.z) == pytest.approx((0.5, 0.2), rel=0.02)
-    return "momentum = force x duration, about the axes too; then it ends"
+    return "linear and angular momentum are wrench x duration; afterwards no wrench acts"
 
 
 @service(srv.BodyRequest, lambda: failed("clear_body_wrenches", srv.BodyRequest, "mug::link"))
@@ -340,7 +340,7 @@ def clear_body_wrenches() -> str:
     pass_time(0.1)
     assert state("cube").twist.linear.x == pytest.approx(before, rel=1e-3)
     assert before > 0.01
-    return "a wrench without end has ended"
+    return "a wrench without a limited duration has ended"
 
 
 # ---- joints ----
@@ -363,11 +363,11 @@ def set_joint_properties() -> str:
     done(set_joint(damping=[0.05], loStop=[-1.0], hiStop=[1.0]))
     assert hinge().damping == (0.05,)
     beyond = call("set_model_configuration", srv.SetModelConfiguration, "door", "", ["hinge"], [1.5])
-    assert "allowed is -1 to 1 rad" in beyond.status_message
+    assert "allowed: -1 to 1 rad" in beyond.status_message
     done(set_joint(vel=[0.5], fmax=[5.0]))
     until(lambda: abs(hinge().rate[0] - 0.5) < 0.02, "the motor's velocity")
     done(set_joint(damping=[0.0], loStop=[-2.0], hiStop=[2.0], vel=[0.0], fmax=[0.0]))
-    return "damping, limits and a motor are in force"
+    return "damping, limits and a motor take effect"
 
 
 def turn(joint: str, effort: float, duration_s: float) -> Any:
@@ -380,7 +380,7 @@ def apply_joint_effort() -> str:
     done(turn("door::hinge", 0.1, 0.1))
     pass_time(0.2)
     assert hinge().rate[0] == pytest.approx(0.1 * 0.1 / HINGE_INERTIA, rel=0.03)
-    return "momentum = effort x duration; then it ends"
+    return "the momentum is effort x duration; afterwards no effort acts"
 
 
 @service(srv.JointRequest, lambda: failed("clear_joint_forces", srv.JointRequest, "knee"))
@@ -392,7 +392,7 @@ def clear_joint_forces() -> str:
     pass_time(0.1)
     assert hinge().rate[0] == pytest.approx(before, rel=1e-2)
     assert before > 0.01
-    return "an effort without end has ended"
+    return "an effort without a limited duration has ended"
 
 
 # ---- lights ----
@@ -432,7 +432,7 @@ def get_physics_properties() -> str:
     found = done(call("get_physics_properties", srv.GetPhysicsProperties))
     assert (found.pause, found.gravity.z) == (False, 0.0)
     assert found.time_step * found.max_update_rate == pytest.approx(1.0), "the real time factor"
-    return "step, rate, gravity, solver"
+    return "time step, rate, gravity, solver"
 
 
 def set_physics(**changes: Any) -> Any:
@@ -458,7 +458,7 @@ def set_physics_properties() -> str:
         assert "without effect" in done(set_physics(ode_config=ode)).status_message
     finally:
         done(set_physics(time_step=0.002, max_update_rate=500.0, gravity=Vector3()))
-    return "step, pace and gravity are in force; ODE's settings that this engine lacks are named"
+    return "time step, real time factor and gravity take effect; the answer names unsupported ODE settings"
 
 
 @service(Empty, no_input)
@@ -467,7 +467,7 @@ def pause_physics() -> str:
     before = time_s()
     time.sleep(0.2)
     assert time_s() == before
-    return "time stands still"
+    return "time is paused"
 
 
 @service(Empty, no_input)
@@ -475,7 +475,7 @@ def unpause_physics() -> str:
     call("pause_physics", Empty)
     call("unpause_physics", Empty)
     pass_time(0.05)
-    return "time passes"
+    return "time continues"
 
 
 def disturb() -> None:
@@ -498,7 +498,7 @@ def reset_world() -> str:
     call("reset_world", Empty)
     assert is_restored()
     assert time_s() >= before
-    return "models and joints are where they began, at rest, no force acts; time goes on"
+    return "models and joints have their initial positions and no velocity; no force acts; time continues"
 
 
 @service(Empty, no_input)
@@ -507,7 +507,7 @@ def reset_simulation() -> str:
     call("reset_simulation", Empty)
     assert is_restored()
     assert time_s() < 0.5
-    return "the same, and time begins at 0"
+    return "as reset_world; time restarts at 0"
 
 
 def set_parameter(name: str, value: float) -> dict[str, float]:
@@ -520,7 +520,7 @@ def nan_stays_out() -> str:
     with reasons_in_log() as reasons:
         assert set_parameter("gravity_z", NAN)["gravity_z"] == 0.0
         until(lambda: any("gravity_z: got nan" in item for item in reasons), "the reason in the log")
-    return "the value stays, the log says why (a value out of its range becomes the nearest, as everywhere)"
+    return "NaN is not set, and the log has the reason (dynamic_reconfigure clamps values outside the range)"
 
 
 @service(Reconfigure, nan_stays_out)
@@ -532,13 +532,13 @@ def set_parameters() -> str:
         assert state("cube").twist.linear.x > 0.05
     finally:
         done(set_physics(gravity=Vector3()))
-    return "the settings of set_physics_properties one by one (dynamic_reconfigure)"
+    return "single settings of set_physics_properties take effect (dynamic_reconfigure)"
 
 
 @service(GetLoggers, no_input)
 def get_loggers() -> str:
     assert "rosout" in {item.name for item in call("get_loggers", GetLoggers).loggers}
-    return "the node's loggers"
+    return "loggers of the node"
 
 
 def logger_level() -> str:
@@ -549,7 +549,7 @@ def unknown_level() -> str:
     before = logger_level()
     call("set_logger_level", SetLoggerLevel, "rosout", "loudest")
     assert logger_level() == before
-    return "the level stays (rospy's own service: no reason)"
+    return "the level is not changed (service of rospy, without a reason)"
 
 
 @service(SetLoggerLevel, unknown_level)
@@ -558,7 +558,7 @@ def set_logger_level() -> str:
     found = logger_level()
     call("set_logger_level", SetLoggerLevel, "rosout", "INFO")
     assert found == "debug"
-    return "the level is in force"
+    return "the level takes effect"
 
 
 # ---- topics ----
@@ -575,7 +575,7 @@ def model_states_topic() -> str:
     found = heard("model_states", msg.ModelStates)
     assert found.name == ["floor", "cube", "door"]
     assert found.pose[1].position.z == pytest.approx(1.0)
-    return "all models, 50 Hz of simulated time"
+    return "all models, at 50 Hz of simulated time"
 
 
 @topic(msg.LinkStates, no_input)
@@ -583,14 +583,14 @@ def link_states_topic() -> str:
     found = heard("link_states", msg.LinkStates)
     assert found.name == ["floor::link", "cube::link", "door::post", "door::leaf"]
     assert found.pose[3].position.x == pytest.approx(3.4)
-    return "all links, 50 Hz of simulated time"
+    return "all links, at 50 Hz of simulated time"
 
 
 @topic(msg.PerformanceMetrics, no_input)
 def performance_metrics_topic() -> str:
     heard("performance_metrics", msg.PerformanceMetrics)
     assert heard("performance_metrics", msg.PerformanceMetrics).real_time_factor == pytest.approx(1.0, abs=0.5)
-    return "real time factor, 5 Hz of simulated time; no sensors"
+    return "real time factor, at 5 Hz of simulated time; no sensors"
 
 
 @topic(ConfigDescription, no_input)
@@ -599,7 +599,7 @@ def parameter_descriptions_topic() -> str:
     names = [item.name for group in found.groups for item in group.parameters]
     assert len(names) == 15
     assert {"time_step", "max_update_rate", "gravity_z", "sor_pgs_iters", "erp"} <= set(names)
-    return "the fifteen parameters of Gazebo's physics, latched"
+    return "the 15 physics parameters of Gazebo, latched"
 
 
 @topic(Config, no_input)
@@ -612,7 +612,7 @@ def parameter_updates_topic() -> str:
     finally:
         done(set_physics(gravity=Vector3()))
         client.close()
-    return "every change from any source, latched"
+    return "every change, latched"
 
 
 def logged(name: str, kind: Any, message: Any) -> str:
@@ -637,14 +637,14 @@ def publish_until(name: str, kind: Any, message: Any, seen: Callable[[], bool]) 
 def set_model_state_topic() -> str:
     wanted = msg.ModelState("cube", at(2, 0, 1), Twist(), "")
     publish_until("set_model_state", msg.ModelState, wanted, lambda: abs(state("cube").pose.position.x - 2) < 1e-6)
-    return "as the service"
+    return "as the service of the same name"
 
 
 @topic(msg.LinkState, lambda: logged("set_link_state", msg.LinkState, msg.LinkState("", Pose(), Twist(), "")))
 def set_link_state_topic() -> str:
     wanted = msg.LinkState("cube::link", at(2, 0, 1), Twist(), "")
     publish_until("set_link_state", msg.LinkState, wanted, lambda: abs(state("cube").pose.position.x - 2) < 1e-6)
-    return "as the service"
+    return "as the service of the same name"
 
 
 # ---- the tests ----
@@ -730,7 +730,7 @@ def test_the_node_has_everything_of_gazebo_ros_and_the_table_leaves_nothing_out(
 
 
 def table(kind: str, cases: dict[str, Case]) -> list[str]:
-    lines = [f"| {kind} | type | with good input | with bad input |", "|---|---|---|---|"]
+    lines = [f"| {kind} | type | with valid input | with invalid input |", "|---|---|---|---|"]
     for name, case in cases.items():
         shown = "/clock" if name == "clock" else f"/gazebo/{name}"
         good, bad = (SEEN[kind, name, which].replace("|", "/").replace("\n", " ") for which in ("good", "bad"))

@@ -169,7 +169,7 @@ def test_a_model_can_be_put_elsewhere_by_topic(simulation: Any) -> None:
             lambda: call(
                 "/gazebo/set_model_configuration", SetModelConfiguration, "ur5_with_ezgripper", "", ["j" * 5000], [1.0]
             ),
-            "no joint",
+            "no movable joint",
         ),
         (lambda: spawn("x", 0, 0, 1, "nowhere"), "no model 'nowhere'"),
         (lambda: spawn("x", 0, 0, float("nan")), "give finite numbers"),
@@ -238,7 +238,7 @@ def test_all_options_of_spawn_model_have_their_effect(simulation: Any, ros_sessi
         assert spawn_model(*words)[0] == 1, "there is no package of that name"
         code, text = spawn_model(*words, "-package_to_model", "-robot_namespace", "/some", "-unpause")
         assert code == 0, text
-        assert "-robot_namespace /some counts for sensors only" in text
+        assert "-robot_namespace /some applies to sensors only" in text
         assert not call("/gazebo/get_physics_properties", GetPhysicsProperties).pause
         bonded = subprocess.Popen(
             [*command, "-sdf", "-database", "cube", "-model", "bonded", "-b"],
@@ -330,7 +330,7 @@ def test_joints_are_put_somewhere_and_the_controllers_hold_them_there(simulation
     positions = dict(zip(joints.name, joints.position, strict=True))
     assert [positions[name] for name in ARM] == pytest.approx(wanted, abs=0.005)
     answer = call(service, SetModelConfiguration, "ur5_with_ezgripper", "", ["knee"], [1.0])
-    assert (answer.success, "no joint" in answer.status_message) == (False, True)
+    assert (answer.success, "no movable joint" in answer.status_message) == (False, True)
 
 
 def test_move_group_is_shown_the_world_and_what_happens_in_it(simulation: Any) -> None:

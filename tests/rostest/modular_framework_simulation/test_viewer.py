@@ -314,7 +314,7 @@ def test_buttons_pause_step_resume_and_reset(box: Browser) -> None:
 
 
 def test_a_step_needs_a_pause_and_has_bounds(launch: Any) -> None:
-    for duration_s, reason in ((0.1, "not paused"), (1.5, "allowed is 0"), (-1.0, "allowed is 0")):
+    for duration_s, reason in ((0.1, "not paused"), (1.5, "allowed: 0"), (-1.0, "allowed: 0")):
         answer = call("/gazebo/step_time", AdvanceTime, rospy.Duration.from_sec(duration_s))
         assert not answer.success and reason in answer.message
 
@@ -383,8 +383,8 @@ def test_an_image_is_subscribed_to_while_it_is_chosen(box: Browser) -> None:
 
 def test_bad_messages_are_named_and_change_nothing(launch: Any, box: Browser) -> None:
     for topic, fault in (
-        ("visible_models", "no list of visible models"),
-        ("visible_poses", "no poses of visible models"),
+        ("visible_models", "not a list of visible models"),
+        ("visible_poses", "not the poses of visible models"),
     ):
         publisher = published(f"/gazebo/{topic}", String)
         texts = itertools.cycle(("", "\x00", "[1]", '{"poses": {"x": 3}}', "[" * 5000))

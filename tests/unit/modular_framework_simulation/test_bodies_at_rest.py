@@ -412,7 +412,7 @@ def test_a_body_at_the_top_of_its_flight_is_not_taken_for_one_at_rest(make_world
 
 def test_the_state_of_a_world_with_bodies_at_rest_is_not_saved(table: PhysicsWorld, engine: str) -> None:
     if engine == PYBULLET:
-        with pytest.raises(SimulationError, match="make it with rest_speed 0"):
+        with pytest.raises(SimulationError, match="set rest_speed to 0"):
             table.save_state()
     else:
         table.save_state()

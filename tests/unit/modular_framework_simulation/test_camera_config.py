@@ -154,7 +154,10 @@ def test_a_camera_of_a_urdf_has_no_depth() -> None:
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        (urdf(KINECT, "tail"), "robot_description:4: <sensor name='eye'>: <gazebo reference='tail'>: there is no such"),
+        (
+            urdf(KINECT, "tail"),
+            "robot_description:4: <sensor name='eye'>: <gazebo reference='tail'>: the robot has no such link",
+        ),
         (urdf(KINECT.replace("openni_kinect", "prosilica")), "got the plugin 'libgazebo_ros_prosilica.so'; allowed"),
         (urdf(KINECT.replace("1.2", "wide")), "<camera/horizontal_fov>: got 'wide'; expected a number"),
         (urdf(KINECT.replace("0 0 0.5 0", "0 0 0.5")), "<pose>: got '0 0 0.5 0 0'; expected six numbers"),

@@ -150,7 +150,7 @@ def test_topic_frame_and_rate_are_those_of_the_plugin() -> None:
 def test_a_sensor_in_a_slide_is_refused() -> None:
     sensors, faults = sensors_of(urdf("prismatic"))
     assert sensors == []
-    assert "got 'wrist'; allowed are joints that are fixed or turn: shoulder, flange" in faults[0]
+    assert "got 'wrist'; allowed are fixed and revolute joints: shoulder, flange" in faults[0]
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_a_sensor_in_a_slide_is_refused() -> None:
         (
             "<jointName>wrist",
             "<jointName>elbow",
-            "<jointName>: got 'elbow'; allowed are joints that are fixed or turn: shoulder, wrist, flange",
+            "<jointName>: got 'elbow'; allowed are fixed and revolute joints: shoulder, wrist, flange",
         ),
         ("250", "often", "<updateRate>: got 'often'; expected a number"),
         (

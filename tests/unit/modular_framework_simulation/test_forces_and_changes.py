@@ -227,14 +227,14 @@ def test_the_robot_and_static_models_keep_what_their_description_says(
 ) -> None:
     robot = RobotBody(world, read_robot(lift_robot_urdf(), no_packages, convex_parts, False), "lifter", Pose(), {})
     heavy = specs.Inertial(Pose(), 9.0, (0.1, 0, 0, 0.1, 0, 0.1))
-    for link, said in ((PartName("lifter", "palm"), "the robot"), (PartName("floor", "link"), "static")):
+    for link, said in ((PartName("lifter", "palm"), "the controlled robot"), (PartName("floor", "link"), "static")):
         with pytest.raises(ModelChangeError, match=said):
             set_inertial(world, link, heavy)
     assert measured_inertial(world.engine, robot.body, "palm").mass == 2.0
     for change in (JointChange(0.0, 0.1, JointSettings()), JointChange(None, None, JointSettings(None, 1.0, 1.0))):
-        with pytest.raises(ModelChangeError, match="the robot"):
+        with pytest.raises(ModelChangeError, match="the controlled robot"):
             set_joint(world, PartName("lifter", "lift"), change)
-    with pytest.raises(ModelChangeError, match="the robot"):
+    with pytest.raises(ModelChangeError, match="the controlled robot"):
         set_link_state(world, PartName("lifter", "palm"), BodyState(Pose(), Twist()), "")
 
 
@@ -276,9 +276,9 @@ def test_joint_positions_are_set_within_the_limits_only(space: PhysicsWorld) -> 
     door(space)
     set_joint_positions(space, "door", {"hinge": 1.0})
     assert measured_joint(space.engine, space.body("door"), "hinge").position == pytest.approx(1.0)
-    with pytest.raises(ModelChangeError, match="'door::hinge': got 2.5; allowed is -2 to 2 rad"):
+    with pytest.raises(ModelChangeError, match="'door::hinge': got 2.5; allowed: -2 to 2 rad"):
         set_joint_positions(space, "door", {"hinge": 2.5})
-    with pytest.raises(UnknownEntityError, match="no joint that moves 'door::fast'"):
+    with pytest.raises(UnknownEntityError, match="no movable joint 'door::fast'"):
         set_joint_positions(space, "door", {"fast": 0.0})
     assert measured_joint(space.engine, space.body("door"), "hinge").position == pytest.approx(1.0)
 

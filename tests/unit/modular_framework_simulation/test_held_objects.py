@@ -103,7 +103,7 @@ def test_a_weld_ends_when_the_world_is_reset_or_its_object_deleted(benchmark: An
     state = trial.world.save_state()
     trial.loop.reset_poses()
     assert welds(trial) == 0
-    with pytest.raises(SimulationError, match="what the hands hold has changed"):
+    with pytest.raises(SimulationError, match="the held objects have changed"):
         trial.world.restore_state(state)
     trial.world.close()
     trial = welded()

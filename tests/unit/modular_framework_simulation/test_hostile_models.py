@@ -30,9 +30,9 @@ IN_A_MODEL = {
     "an attribute without quotes": ("\n<link name=a/>", 3, "not well-formed"),
     "no links at all": ("<plugin name='p'/>", 1, "has no <link>"),
     "a link without a name": ("\n<link/>", 3, "has no name"),
-    "two links of one name": ("<link name='a'/>\n<link name='a'/>", 3, "only link of that name"),
+    "two links of one name": ("<link name='a'/>\n<link name='a'/>", 3, "the name of another link"),
     "two joints of one name": (joint("", "ball") + "\n<joint name='j' type='ball'><parent>a</parent>"
-        "<child>b</child></joint>", 4, "only joint of that name"),
+        "<child>b</child></joint>", 4, "the name of another joint"),
     "a pose of five numbers": ("<link name='a'>\n<pose>1 2 3 4 5</pose></link>", 3, "expected 6 finite"),
     "a pose that is not a number": ("<link name='a'>\n<pose>0 0 nan 0 0 0</pose></link>", 3, "expected 6 finite"),
     "a pose without end": ("<link name='a'>\n<pose>0 0 1e999 0 0 0</pose></link>", 3, "expected 6 finite"),
@@ -74,7 +74,7 @@ IN_A_MODEL = {
         joint("<axis><xyz>0 0 1</xyz><limit><lower>1</lower><upper>0</upper></limit></axis>"), 3, "lower 1"),
     "a negative damping": (
         joint("<axis><xyz>0 0 1</xyz><dynamics><damping>-1</damping></dynamics></axis>"), 3, "0 or greater"),
-    "a joint to nowhere": (joint("", "fixed", child="x"), 3, "'x' is no link"),
+    "a joint to nowhere": (joint("", "fixed", child="x"), 3, "'x' is not a link"),
     "a hinge that carries the world": (joint("<axis/>", child="world"), 3, "is the world"),
     "a model merged into another": ("<include merge='true'><uri>model://x</uri></include>", 2, "merge='true'"),
     "static of maybe": ("\n<static>maybe</static><link name='a'/>", 3, "allowed: true, false"),
@@ -122,15 +122,15 @@ def test_files_that_include_each_other_many_times_over_are_refused(tmp_path: Pat
         (tmp_path / f"m{number}" / "model.sdf").write_text(f"<sdf version='1.6'><model name='m'>{body}</model></sdf>")
     path = tmp_path / "bomb.world"
     path.write_text("<sdf version='1.6'><world name='w'><include><uri>model://m0</uri></include></world></sdf>")
-    with pytest.raises(DescriptionError, match=r"is the model number 10,001; allowed: 10,000"):
+    with pytest.raises(DescriptionError, match=r"is model number 10,001; allowed: 10,000"):
         read_world(path, Resources((tmp_path,)))
 
 
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("<population name='p'/>", ":2: <population name='p'>: is not simulated"),
-        ("<joint name='j'/>", ":2: <joint name='j'>: is not simulated"),
+        ("<population name='p'/>", ":2: <population name='p'>: is not supported"),
+        ("<joint name='j'/>", ":2: <joint name='j'>: is not supported"),
         ("<gravity>0 0 down</gravity>", ":2: <gravity>: got '0 0 down'"),
         ("<include/>", ":2: <include>: has no <uri>"),
         ("<include><uri></uri></include>", "does not exist"),

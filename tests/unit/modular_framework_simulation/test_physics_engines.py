@@ -47,7 +47,7 @@ def press(world: PhysicsWorld, body: SimulatedBody) -> float:
 
 
 def test_an_unknown_engine_is_refused_with_those_there_are(convex_parts: ConvexParts) -> None:
-    with pytest.raises(SimulationError, match="physics engine 'ode': there is no such engine; allowed: pybullet, muj"):
+    with pytest.raises(SimulationError, match="physics engine 'ode' is unknown; allowed: pybullet, muj"):
         PhysicsWorld(PhysicsSettings(), convex_parts, engine="ode")
 
 
@@ -206,7 +206,7 @@ def test_what_mujoco_refuses_changes_nothing(convex_parts: ConvexParts) -> None:
     run(world, 0.1)
     before = exact_state(world)
     flat = solid("flat", specs.Box((0.1, 0.1, 0.0)), Pose((1, 0, 1)))
-    with pytest.raises(DescriptionError, match="model 'flat': is refused by the physics engine mujoco .*size"):
+    with pytest.raises(DescriptionError, match="model 'flat': is rejected by the physics engine mujoco .*size"):
         world.spawn(flat)
     assert exact_state(world) == before
     run(world, 0.1)

@@ -218,7 +218,7 @@ def test_an_object_in_urdf_is_read_with_weight_and_friction(world: PhysicsWorld)
     ("inside", "fault"),
     [
         ("<joint name='t' type='continuous'><parent link='a'/><child link='b'/><mimic joint='t'/></joint>", "t -> t"),
-        ("<xacro:include filename='x'/>", "this is xacro"),
+        ("<xacro:include filename='x'/>", "is xacro"),
     ],
 )
 def test_an_object_in_urdf_that_defines_itself_or_is_not_expanded_is_refused(inside: str, fault: str) -> None:
@@ -261,7 +261,10 @@ def test_a_name_the_engine_has_no_room_for_is_refused(world: PhysicsWorld, part:
         ("<link name='a'><collision><geometry><torus/></geometry></collision></link>", "allowed: one of box"),
         ("", "has no <link>"),
         ("<link name='a'/><joint name='j' type='ball'><parent link='a'/><child link='b'/></joint>", "'ball'"),
-        ("<link name='a'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>", "'b' is no link"),
+        (
+            "<link name='a'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>",
+            "'b' is not a link",
+        ),
     ],
 )
 def test_a_fault_in_an_urdf_object_is_pointed_at(body: str, said: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from simulated_samples import solid
 
-from modular_framework_simulation.loop.referee import KEPT_INTERVENTIONS, Referee
+from modular_framework_simulation.loop.referee import MAX_INTERVENTIONS, Referee
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.engine_choice import ENGINES
@@ -65,7 +65,7 @@ def test_a_request_that_moves_a_model_is_noted_by_its_service_only(world: Physic
 
 def test_interventions_keep_their_numbers_however_many_there_are(world: PhysicsWorld) -> None:
     referee = Referee(world)
-    for _ in range(2 * KEPT_INTERVENTIONS):
+    for _ in range(2 * MAX_INTERVENTIONS):
         referee.note("/gazebo/set_model_state", "/somebody")
     numbers = [each.number for each in referee.interventions]
-    assert numbers == list(range(KEPT_INTERVENTIONS + 1, 2 * KEPT_INTERVENTIONS + 1))
+    assert numbers == list(range(MAX_INTERVENTIONS + 1, 2 * MAX_INTERVENTIONS + 1))

@@ -346,7 +346,7 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
         ),
         (
             with_ros2_control("<joint name='elbow'/>"),
-            "<ros2_control>, joint 'elbow': is no joint that moves; allowed: lift",
+            "<ros2_control>, joint 'elbow': is not a movable joint; allowed: lift",
         ),
         (
             with_ros2_control("<joint name='lift'><command_interface name='torque'/></joint>"),

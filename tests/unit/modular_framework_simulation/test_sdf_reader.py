@@ -136,7 +136,7 @@ def test_a_joint_without_limits_turns_without_end() -> None:
         ("<link name='l'><collision name='c'>\n<geometry><cone/></geometry></collision></link>", 3, ["<cone>", "box"]),
         ("<link name='l'>\n<collision><geometry/></collision></link>", 3, ["<collision>", "no name"]),
         ("<link name='l'><inertial>\n<mass>-1</mass></inertial></link>", 3, ["<mass>", "-1", "greater than 0"]),
-        ("<link name='a'/>\n<link name='a'/>", 3, ["only link of that name"]),
+        ("<link name='a'/>\n<link name='a'/>", 3, ["the name of another link"]),
         ("\n<model name='inner'/>", 3, ["<model name='inner'>", "no <link>"]),
         ("", 1, ["no <link>"]),
         (
@@ -147,7 +147,7 @@ def test_a_joint_without_limits_turns_without_end() -> None:
         (
             "<link name='a'/>\n<joint name='j' type='fixed'><parent>a</parent><child>c</child></joint>",
             3,
-            ["<child>", "'c' is no link", "allowed: a"],
+            ["<child>", "'c' is not a link", "allowed: a"],
         ),
         ("<link name='a'><pose relative_to='nowhere'>0 0 0 0 0 0</pose></link>", 1, ["'nowhere'", "allowed"]),
         (
@@ -195,7 +195,7 @@ def test_broken_documents_are_refused(tmp_path: Path) -> None:
         read_model_text("<sdf version='1.6'><model>", "text", Resources())
     with pytest.raises(DescriptionError, match=r"'2\.0'; allowed: 1\.0 to 1\.11"):
         read_model_text("<sdf version='2.0'/>", "text", Resources())
-    with pytest.raises(DescriptionError, match="holds no <model>"):
+    with pytest.raises(DescriptionError, match="contains no <model>"):
         read_model_text("<sdf version='1.6'/>", "text", Resources())
     with pytest.raises(DescriptionError, match="allowed: <sdf"):
         read_model_text("<robot/>", "text", Resources())

@@ -26,7 +26,7 @@ from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_simulation.sensors.cameras import CameraImage
-from modular_framework_simulation.sensors.contact import ContactListener, ContactSensor, TouchedPair
+from modular_framework_simulation.sensors.contact import ContactListener, ContactPair, ContactSensor
 from modular_framework_simulation.sensors.force_torque import JointLoad
 from modular_framework_simulation.sensors.imu import Imu, ImuReading, ImuSensor
 from modular_framework_simulation.sensors.laser import Laser, LaserSensor
@@ -205,11 +205,11 @@ def test_names_angles_and_ranges_of_a_laser_are_those_of_the_file_and_what_has_n
     assert (laser.min_range, laser.max_range, laser.angle_increment) == (0.1, 8.0, 0.5)
     assert laser.angles() == pytest.approx([-1.0, -0.5, 0.0, 0.5, 1.0])
     assert list(sensors_of(described).faults.values()) == [
-        "text:2: <sensor name='scan'>: without effect here: visualize"
+        "text:2: <sensor name='scan'>: elements without effect: visualize"
     ]
 
 
-def touched(world: PhysicsWorld, described: specs.Model) -> list[TouchedPair]:
+def touched(world: PhysicsWorld, described: specs.Model) -> list[ContactPair]:
     """What the contact sensor of a model reports."""
     sensors = sensors_of(described)
     (sensor,) = sensors.found
@@ -228,12 +228,12 @@ def test_a_bumper_names_both_shapes_and_weighs_a_box_within_a_percent(world: Phy
     settled(world, described, Pose((0.3, 0.0, SIZE / 2)))
     (pair,) = touched(world, described)
     assert (pair.own, pair.other) == ("box::link::shape", "floor::link::shape")
-    assert sum(touch.force[2] for touch in pair.touches) == pytest.approx(MASS * GRAVITY, rel=0.01)
-    for touch in pair.touches:
+    assert sum(touch.force[2] for touch in pair.contacts) == pytest.approx(MASS * GRAVITY, rel=0.01)
+    for touch in pair.contacts:
         assert touch.normal == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)
         assert touch.position[2] == pytest.approx(0.0, abs=1e-3)
         assert abs(touch.depth) < 1e-3
-    torque = np.sum([touch.torque for touch in pair.touches], axis=0)
+    torque = np.sum([touch.torque for touch in pair.contacts], axis=0)
     assert torque == pytest.approx((0.0, 0.0, 0.0), abs=0.01 * MASS * GRAVITY * SIZE)
 
 
@@ -245,7 +245,7 @@ def test_friction_counts_on_a_slope_where_normal_and_friction_together_carry_the
     described = model(BUMPER.format(shape="link::shape", frame="link"))
     settled(world, described, Pose((0.0, 0.0, SIZE / 2)))
     (pair,) = touched(world, described)
-    force = np.sum([touch.force for touch in pair.touches], axis=0)
+    force = np.sum([touch.force for touch in pair.contacts], axis=0)
     assert force == pytest.approx(-MASS * np.array(world.gravity), abs=0.01 * MASS * GRAVITY)
 
 
@@ -256,9 +256,9 @@ def test_a_bumper_of_what_stands_still_feels_the_weight_downwards(world: Physics
     settled(world, box, Pose((0.0, 0.0, SIZE)))
     (pair,) = [each for each in touched(world, replace(plate, static=True)) if each.other.startswith("load")]
     assert pair.own == "plate::link::shape"
-    force = np.sum([touch.force for touch in pair.touches], axis=0)
+    force = np.sum([touch.force for touch in pair.contacts], axis=0)
     assert force == pytest.approx((0.0, 0.0, -MASS * GRAVITY), abs=0.01 * MASS * GRAVITY)
-    assert pair.touches[0].normal == pytest.approx((0.0, 0.0, -1.0), abs=1e-4)
+    assert pair.contacts[0].normal == pytest.approx((0.0, 0.0, -1.0), abs=1e-4)
 
 
 def test_of_several_shapes_of_a_link_the_one_that_touches_is_named(world: PhysicsWorld) -> None:
@@ -269,9 +269,9 @@ def test_of_several_shapes_of_a_link_the_one_that_touches_is_named(world: Physic
     settled(world, described, Pose((0.0, 0.0, 0.2)))
     (pair,) = touched(world, described)
     assert pair.own == "box::link::foot"
-    assert pair.touches[0].position[0] == pytest.approx(0.3, abs=0.01)
+    assert pair.contacts[0].position[0] == pytest.approx(0.3, abs=0.01)
     every = sum(point.force[2] for point in world.contact_points("box", "link"))
-    assert 0.0 < sum(touch.force[2] for touch in pair.touches) < 0.9 * every
+    assert 0.0 < sum(touch.force[2] for touch in pair.contacts) < 0.9 * every
 
 
 @pytest.mark.parametrize(
@@ -283,8 +283,8 @@ def test_of_several_shapes_of_a_link_the_one_that_touches_is_named(world: Physic
         (LASER.format(pose="0 0", samples=1, low=0, high=0, noise=""), "<pose>: got '0 0'; expected six numbers"),
         (LASER.format(pose="", samples=0, low=0, high=0, noise=""), "<ray/scan/horizontal/samples>: got 0; allowed: 1"),
         (LASER.format(pose="", samples=1, low=1, high=0, noise=""), "max_angle>: got 0 rad; allowed: 1 (min_angle)"),
-        (IMU.format(pose="", noise="").replace("<frameName>imu_frame</frameName>", ""), "<frameName>: got nothing"),
-        ("<sensor name='s' type='imu'/>", "nothing publishes it; add a <plugin> (gazebo_ros_imu_sensor"),
+        (IMU.format(pose="", noise="").replace("<frameName>imu_frame</frameName>", ""), "<frameName>: is empty"),
+        ("<sensor name='s' type='imu'/>", "has no topic; add a <plugin> (gazebo_ros_imu_sensor"),
         (IMU.format(pose="", noise="").replace("_imu_sensor.so", "_gps.so"), "got the plugin 'libgazebo_ros_gps.so'"),
         (
             LASER.format(pose="", samples=1, low=0, high=0, noise="<noise type='odd'/>"),
@@ -487,6 +487,6 @@ def test_sensors_of_a_urdf_are_in_the_links_they_refer_to_and_below_the_namespac
     described = replace(read_urdf_model(text, "text", Resources((), str)), namespace="/toys")
     bumper, imu = sensors_of(described).found
     assert isinstance(bumper, ContactSensor)
-    assert (bumper.topic, bumper.collisions, bumper.measured_in) == ("/toys/bump", ("base_collision",), "base")
+    assert (bumper.topic, bumper.collisions, bumper.reference_link) == ("/toys/bump", ("base_collision",), "base")
     assert isinstance(imu, ImuSensor)
     assert (imu.topic, imu.parent, imu.pose.position) == ("/toys/imu_data", "toy::base", (0.0, 0.0, 1.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_simulation.loop.time_holds import LONGEST_SILENCE_S, HoldError, TimeHolds
+from modular_framework_simulation.loop.time_holds import MAX_IDLE_S, HoldError, TimeHolds
 
 
 class RealTime:
@@ -108,20 +108,20 @@ def test_a_renewed_hold_that_only_waits_lets_time_pass_in_the_end_and_says_so_on
     holds: TimeHolds, real_time: RealTime, log: list[str]
 ) -> None:
     passed_at_s = None
-    for second in range(int(LONGEST_SILENCE_S) + 20):
+    for second in range(int(MAX_IDLE_S) + 20):
         holds.hold("task", 10.0)
         if holds.may_pass(0, moving=False) and passed_at_s is None:
             passed_at_s = second
         real_time.now_s += 1.0
-    assert passed_at_s == LONGEST_SILENCE_S
+    assert passed_at_s == MAX_IDLE_S
     assert len(log) == 1 and "task" in log[0] and "not repeatable" in log[0]
 
 
 def test_silence_counts_from_the_last_request(holds: TimeHolds, real_time: RealTime) -> None:
     holds.hold("task", 600.0)
-    real_time.now_s += LONGEST_SILENCE_S - 1.0
+    real_time.now_s += MAX_IDLE_S - 1.0
     holds.give_up(holds.advance(1))
-    real_time.now_s += LONGEST_SILENCE_S - 1.0
+    real_time.now_s += MAX_IDLE_S - 1.0
     assert not holds.may_pass(0, moving=False)
 
 

@@ -66,10 +66,10 @@ def test_what_has_no_effect_is_named() -> None:
         </joint><gazebo reference='d'><material>Plaid</material></gazebo>"""
     notes = "\n".join(read(text).notes)
     for said in (
-        "<transmission name='t'>: has no effect here",
-        "refers to 'c', which is no link and no joint",
-        "<mimic>: has no effect here",
+        "<transmission name='t'>: has no effect",
+        "refers to 'c', which is not a link or joint",
+        "<mimic>: has no effect",
         "<link name='b'>: has no <inertial>",
-        "'Plaid' is no material that is known here",
+        "'Plaid' is not a known material",
     ):
         assert said in notes

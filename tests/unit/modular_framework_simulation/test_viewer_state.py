@@ -250,7 +250,7 @@ def test_a_bad_object_is_named_and_harms_no_other(change: Any) -> None:
 
 def test_a_move_of_an_unknown_object_is_named() -> None:
     (fault,) = PlanningSceneObjects().apply(scene(collision_object("ghost", CollisionObject.MOVE)))
-    assert "never added" in fault
+    assert "does not exist" in fault
 
 
 # plans

@@ -149,7 +149,9 @@ def test_a_picture_that_a_mesh_names_and_that_is_not_there_is_noted(model_folder
     assert read_model_text(text, "text", Resources((model_folder.parent,))).notes == ()
     (model_folder / "materials" / "textures" / "paint.png").unlink()
     notes = read_model_text(text, "text", Resources((model_folder.parent,))).notes
-    assert notes == ("text:1: <visual name='v'>: the picture 'paint.png' of sign.dae is not there: drawn without",)
+    assert notes == (
+        "text:1: <visual name='v'>: the image 'paint.png' of sign.dae does not exist; drawn without a texture",
+    )
 
 
 def test_materials_are_found_by_name(model_folder: Path) -> None:
@@ -172,9 +174,9 @@ def test_materials_are_found_by_name(model_folder: Path) -> None:
     assert read("Gazebo/Red")[0].colour == (1, 0, 0, 1)
     unknown, notes = read("Unknown/Thing")
     assert unknown.colour == specs.GREY
-    assert "no material 'Unknown/Thing' is found: drawn grey" in notes[0]
+    assert "material 'Unknown/Thing' is not found; drawn grey" in notes[0]
     (model_folder / "materials" / "textures" / "paint.png").unlink()
-    assert "the picture 'paint.png' is not there" in read("Painted")[1][0]
+    assert "the image 'paint.png' does not exist" in read("Painted")[1][0]
 
 
 def test_gazebos_materials_have_their_colours() -> None:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A PyBullet world behind the names of Gazebo."""
+"""Robot simulation in PyBullet or MuJoCo with the ROS interface of Gazebo."""

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The errors this package raises, so that the ROS interface can turn every one of them into a status message."""
+"""Errors of this package; the ROS interface converts each error into a status message."""
 
 from modular_framework_ros.allowed_names import nearest
 
-LONGEST_NAME = 100
-"""Characters of a name that a message shows at most."""
-LONGEST_LIST = 50
-"""Names that a message lists at most."""
+MAX_NAME_LENGTH = 100
+"""Maximum number of characters of a name in a message."""
+MAX_LISTED_NAMES = 50
+"""Maximum number of names in a message."""
 
 
 class SimulationError(Exception):
@@ -18,8 +18,8 @@ class DescriptionError(SimulationError):
 
     Args:
         where: File, line and element at fault.
-        problem: What was found.
-        allowed: What would have been accepted and what to do about it.
+        problem: Invalid content.
+        allowed: Accepted content, and the action to take.
     """
 
     def __init__(self, where: str, problem: str, allowed: str) -> None:
@@ -33,9 +33,9 @@ class UnknownEntityError(SimulationError):
     """The world has no model, link or joint of a requested name.
 
     Args:
-        kind: What was not found: "model", "link" or "joint".
-        name: The requested name.
-        known: The names that exist.
+        kind: Kind of the missing entity: "model", "link" or "joint".
+        name: Requested name.
+        known: Existing names.
     """
 
     def __init__(self, kind: str, name: str, known: list[str]) -> None:
@@ -50,9 +50,9 @@ class AmbiguousNameError(SimulationError):
     """Several models have a link or joint of a requested name.
 
     Args:
-        kind: What was meant: "link" or "joint".
-        name: The requested name.
-        found: The full names of all that have it.
+        kind: Kind of the entities: "link" or "joint".
+        name: Requested name.
+        found: Full names of all matching entities.
     """
 
     def __init__(self, kind: str, name: str, found: list[str]) -> None:
@@ -62,21 +62,21 @@ class AmbiguousNameError(SimulationError):
 
 
 def _shown(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    return name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
 
 
 def _listed(names: list[str]) -> str:
-    shown = sorted(names)[:LONGEST_LIST]
+    shown = sorted(names)[:MAX_LISTED_NAMES]
     more = len(names) - len(shown)
     return (", ".join(shown) or "none") + (f" and {more} more" if more else "")
 
 
 class ModelChangeError(SimulationError):
-    """A model cannot be changed as asked for."""
+    """A model cannot be changed as requested."""
 
 
 class DuplicateModelError(SimulationError):
-    """A model was to be spawned under a name that is taken."""
+    """The name of a new model is already in use."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"a model '{name}' is already in the simulated world; delete it first or use another name")
@@ -88,4 +88,4 @@ class LoopTimeoutError(SimulationError):
 
 
 class PlanningSceneError(SimulationError):
-    """The planning scene cannot be brought in step with the simulated world."""
+    """The planning scene cannot be synchronized with the simulated world."""

@@ -189,7 +189,7 @@ def generate_move_group_launch(moveit_config: MoveItConfigs) -> LaunchDescriptio
 def generate_demo_launch(moveit_config: MoveItConfigs, launch_package_path: Path | None = None) -> LaunchDescription:
     """Returns a complete launch description for planning and execution: mock hardware, move_group and RViz.
 
-    The `<ros2_control>` tags of the robot description define the hardware, which is mock hardware without such tags.
+    The `<ros2_control>` tags of the robot description define the hardware, with mock hardware as the default.
     The controllers are in config/ros2_controllers.yaml; without this file, each entry of `controller_list` gets a
     controller. With MoveIt 1's fake controllers, a joint_state_publisher publishes their positions. Launch files of the
     config package (rsp.launch.py, move_group.launch.py, moveit_rviz.launch.py, static_virtual_joint_tfs.launch.py,

@@ -53,7 +53,7 @@ class EmulatedArm:
         )
         atexit.register(self.close)
         if self._process.stdout is None or self._process.stdout.readline() != "ready\n":
-            raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
+            raise RuntimeError(f"the emulator at {self.address} did not start; its output is above")
 
     def command(self, command: str, **arguments: Any) -> str:
         """Sends a command with named arguments to the command port, and returns the response."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ROS interface: the names of Gazebo on the wire, and the world in the planning scene."""
+"""ROS interface of the simulation: Gazebo's topics and services, and the world in the planning scene."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of the physics that may be changed while it runs, by the names of Gazebo's parameters."""
+"""Physics settings that can be changed at run time, with the names of Gazebo's parameters."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from geometry_msgs.msg import Vector3
 
 from modular_framework_ros.reconfiguration import Adjustable
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
-from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS
+from modular_framework_simulation.physics.physics_settings import MAX_STEP_NS, MIN_STEP_NS
 
-_LARGEST_GRAVITY = 100.0
-_LARGEST_RATE_HZ = 1e6
+_MAX_GRAVITY = 100.0
+_MAX_RATE_HZ = 1e6
 
 
 @dataclass(frozen=True, slots=True)
 class PhysicsValues:
-    """Settings by their public names.
+    """Physics settings by public names.
+
+    The physics engine does not support the settings with default values; they read as 0 and have no effect.
 
     Attributes:
-        time_step: One physics step [s].
-        max_update_rate: Physics steps a second of real time [Hz]; 0 is as many as possible.
-        gravity_x: [m/s^2]
-        gravity_y: [m/s^2]
-        gravity_z: [m/s^2]
+        time_step: Duration of a physics step [s].
+        max_update_rate: Physics steps per second of real time [Hz]; 0 for no limit.
+        gravity_x: Gravity along x [m/s^2].
+        gravity_y: Gravity along y [m/s^2].
+        gravity_z: Gravity along z [m/s^2].
         sor_pgs_iters: Iterations of the contact solver.
-        erp: Share of a penetration that is corrected in one step.
-        others: The settings of ODE that this engine has nothing like; they read as 0 and have no effect.
+        erp: Fraction of a penetration that is corrected in one step.
     """
 
     time_step: float
@@ -50,40 +51,40 @@ class PhysicsValues:
     max_contacts: int = 0
 
 
-_NOTHING_LIKE_IT = "ODE only: this engine has nothing like it, and the value stays"
+_UNSUPPORTED = "only for ODE; the value has no effect in this engine and cannot be changed"
 
 TABLE = (
-    Adjustable("time_step", SHORTEST_STEP_NS * 1e-9, LONGEST_STEP_NS * 1e-9, "one physics step [s]"),
-    Adjustable("max_update_rate", 0.0, _LARGEST_RATE_HZ, "physics steps a second of real time [Hz]; 0: no limit"),
-    Adjustable("gravity_x", -_LARGEST_GRAVITY, _LARGEST_GRAVITY, "gravity along x [m/s^2]"),
-    Adjustable("gravity_y", -_LARGEST_GRAVITY, _LARGEST_GRAVITY, "gravity along y [m/s^2]"),
-    Adjustable("gravity_z", -_LARGEST_GRAVITY, _LARGEST_GRAVITY, "gravity along z [m/s^2]"),
-    Adjustable("auto_disable_bodies", False, False, _NOTHING_LIKE_IT),
-    Adjustable("sor_pgs_precon_iters", 0, 0, _NOTHING_LIKE_IT),
+    Adjustable("time_step", MIN_STEP_NS * 1e-9, MAX_STEP_NS * 1e-9, "duration of a physics step [s]"),
+    Adjustable("max_update_rate", 0.0, _MAX_RATE_HZ, "physics steps per second of real time [Hz]; 0: no limit"),
+    Adjustable("gravity_x", -_MAX_GRAVITY, _MAX_GRAVITY, "gravity along x [m/s^2]"),
+    Adjustable("gravity_y", -_MAX_GRAVITY, _MAX_GRAVITY, "gravity along y [m/s^2]"),
+    Adjustable("gravity_z", -_MAX_GRAVITY, _MAX_GRAVITY, "gravity along z [m/s^2]"),
+    Adjustable("auto_disable_bodies", False, False, _UNSUPPORTED),
+    Adjustable("sor_pgs_precon_iters", 0, 0, _UNSUPPORTED),
     Adjustable("sor_pgs_iters", 1, 10000, "iterations of the contact solver"),
-    Adjustable("sor_pgs_w", 0.0, 0.0, _NOTHING_LIKE_IT),
-    Adjustable("sor_pgs_rms_error_tol", 0.0, 0.0, _NOTHING_LIKE_IT),
-    Adjustable("cfm", 0.0, 0.0, _NOTHING_LIKE_IT),
-    Adjustable("erp", 0.0, 1.0, "share of a penetration that is corrected in one step"),
-    Adjustable("contact_surface_layer", 0.0, 0.0, _NOTHING_LIKE_IT),
-    Adjustable("contact_max_correcting_vel", 0.0, 0.0, _NOTHING_LIKE_IT),
-    Adjustable("max_contacts", 0, 0, _NOTHING_LIKE_IT),
+    Adjustable("sor_pgs_w", 0.0, 0.0, _UNSUPPORTED),
+    Adjustable("sor_pgs_rms_error_tol", 0.0, 0.0, _UNSUPPORTED),
+    Adjustable("cfm", 0.0, 0.0, _UNSUPPORTED),
+    Adjustable("erp", 0.0, 1.0, "fraction of a penetration that is corrected in one step"),
+    Adjustable("contact_surface_layer", 0.0, 0.0, _UNSUPPORTED),
+    Adjustable("contact_max_correcting_vel", 0.0, 0.0, _UNSUPPORTED),
+    Adjustable("max_contacts", 0, 0, _UNSUPPORTED),
 )
-"""What dynamic_reconfigure offers, in the order of Gazebo."""
+"""Parameters of dynamic_reconfigure, in Gazebo's order."""
 
 
 class AdjustablePhysics:
-    """Reads and changes the settings; used by the loop's thread only.
+    """Reads and changes the settings; only used by the loop's thread.
 
     Args:
-        loop: Whose physics and pace.
+        loop: Loop with the world and the pacer.
     """
 
     def __init__(self, loop: SimulationLoop) -> None:
         self._loop = loop
 
-    def present(self) -> PhysicsValues:
-        """Returns the settings in force."""
+    def current(self) -> PhysicsValues:
+        """Returns the current settings."""
         settings, factor = self._loop.world.settings, self._loop.pacer.real_time_factor
         x, y, z = self._loop.world.gravity
         return PhysicsValues(
@@ -97,18 +98,18 @@ class AdjustablePhysics:
         )
 
     def apply(self, values: PhysicsValues) -> list[str]:
-        """Puts settings in force.
+        """Applies settings.
 
         Returns:
-            Names of those that were given and have no effect, because the engine has nothing like them.
+            Names of unsupported settings with given values, which have no effect.
 
         Raises:
-            ValueError: A value is out of its range; nothing has changed then.
+            ValueError: A value is out of range; no setting has changed.
         """
         faults = [text for item in TABLE if (text := _fault(item, getattr(values, item.name)))]
         if faults:
             raise ValueError("; ".join(faults))
-        present = self.present()
+        current = self.current()
         world = self._loop.world
         settings = replace(
             world.settings,
@@ -119,13 +120,13 @@ class AdjustablePhysics:
         gravity = (values.gravity_x, values.gravity_y, values.gravity_z)
         if (settings, gravity) != (world.settings, world.gravity):
             world.set_physics(settings, gravity)
-        if (values.time_step, values.max_update_rate) != (present.time_step, present.max_update_rate):
+        if (values.time_step, values.max_update_rate) != (current.time_step, current.max_update_rate):
             self._loop.pacer.set_factor(values.max_update_rate * settings.time_step_s)
         return [item.name for item in TABLE if _is_fixed(item) and getattr(values, item.name) != item.lowest]
 
 
 def values_from_request(request: Any) -> PhysicsValues:
-    """Returns the settings of a SetPhysicsProperties request."""
+    """Returns the settings in a SetPhysicsProperties request."""
     ode = request.ode_config
     shared = {field.name: getattr(ode, field.name) for field in fields(PhysicsValues) if hasattr(ode, field.name)}
     gravity = request.gravity
@@ -145,7 +146,7 @@ def gravity_to_msg(values: PhysicsValues) -> Vector3:
 
 
 def ode_to_msg(values: PhysicsValues) -> ODEPhysics:
-    """Returns the settings of the solver as gazebo_msgs/ODEPhysics."""
+    """Returns the solver settings as gazebo_msgs/ODEPhysics."""
     return ODEPhysics(**{name: getattr(values, name) for name in ODEPhysics.__slots__})
 
 
@@ -155,7 +156,7 @@ def _is_fixed(item: Adjustable) -> bool:
 
 def _fault(item: Adjustable, value: float) -> str:
     if not math.isfinite(value):
-        return f"{item.name} is {value}; allowed are finite numbers"
+        return f"{item.name} is {value}; allowed: finite numbers"
     if not _is_fixed(item) and not item.lowest <= value <= item.highest:
-        return f"{item.name} is {value:g}; allowed is {item.lowest:g} to {item.highest:g}"
+        return f"{item.name} is {value:g}; allowed: {item.lowest:g} to {item.highest:g}"
     return ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process that draws and publishes what cameras see, beside the simulation, which starts it."""
+"""Process that renders and publishes camera images; started by the simulation."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from modular_framework_simulation.sensors.renderer import Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneUpdate
 
 _NICENESS = 5
-"""Physics comes first where processors are scarce."""
+"""Lower priority than physics on a busy CPU."""
 _POLL_S = 0.1
-"""How long a new subscriber may wait until the simulation knows of it [s]."""
+"""Maximum delay until the simulation knows a new subscriber [s]."""
 
 
 class CameraPublisher:
-    """The topics of one camera.
+    """Publishes the topics of one camera.
 
-    Publishes: colour image, depth image and their camera_info, and point cloud, under the names in `CameraTopics`.
+    Publishes: colour image, depth image, their camera_info, and point cloud, with the names in `CameraTopics`.
 
     Args:
         camera: The camera.
 
     Attributes:
-        subscriptions: How many there have been so far.
+        subscriptions: Total number of subscriptions so far.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -52,35 +52,35 @@ class CameraPublisher:
         return rospy.Publisher(topic, kind, queue_size=1, subscriber_listener=_Counter(self)) if topic else None
 
     @property
-    def draws(self) -> bool:
-        """Whether somebody subscribes to what has to be drawn."""
+    def needs_image(self) -> bool:
+        """Returns whether an image topic has a subscriber."""
         return any(_subscribed(each) for each in (self._image, self._depth, self._points))
 
     @property
-    def wanted(self) -> bool:
-        """Whether somebody subscribes to anything."""
-        return self.draws or any(_subscribed(each) for each in self._infos)
+    def has_subscribers(self) -> bool:
+        """Returns whether any topic has a subscriber."""
+        return self.needs_image or any(_subscribed(each) for each in self._infos)
 
     def publish(self, update: SceneUpdate, renderer: Renderer) -> None:
-        """Draws and publishes what somebody subscribes to."""
+        """Renders an image, and publishes the topics with subscribers."""
         camera = self.camera
-        head = camera_messages.header(camera.frame_id, update.time_ns)
+        message_header = camera_messages.header(camera.frame_id, update.time_ns)
         for info in self._infos:
             if _subscribed(info):
-                info.publish(camera_messages.camera_info(camera.pinhole, head))
-        if not self.draws:
+                info.publish(camera_messages.camera_info(camera.pinhole, message_header))
+        if not self.needs_image:
             return
         image = renderer.image(camera.pinhole, update.cameras[camera.name]).within(camera.depth_range)
         image = image.with_noise(self._noise, update.time_ns)
         if _subscribed(self._image):
-            self._image.publish(camera_messages.rgb_image(image, head))
+            self._image.publish(camera_messages.rgb_image(image, message_header))
         if _subscribed(self._depth):
-            self._depth.publish(camera_messages.depth_image(image, head))
+            self._depth.publish(camera_messages.depth_image(image, message_header))
         if _subscribed(self._points):
-            self._points.publish(camera_messages.point_cloud(camera.pinhole, image, head))
+            self._points.publish(camera_messages.point_cloud(camera.pinhole, image, message_header))
 
     def close(self) -> None:
-        """Ends the topics."""
+        """Closes the topics."""
         for publisher in (self._image, self._depth, self._points, *self._infos):
             if publisher is not None:
                 publisher.unregister()
@@ -101,73 +101,75 @@ def _subscribed(publisher: Any) -> bool:
     return publisher is not None and publisher.get_num_connections() > 0
 
 
-def replaced(publishers: list[CameraPublisher], cameras: tuple[Camera, ...]) -> list[CameraPublisher]:
-    """Returns the publishers of other cameras; those of cameras that stay keep their subscribers."""
-    kept = {each.camera.name: each for each in publishers if each.camera in cameras}
+def updated_publishers(publishers: list[CameraPublisher], cameras: tuple[Camera, ...]) -> list[CameraPublisher]:
+    """Returns publishers for new cameras; publishers of unchanged cameras are kept with their subscribers."""
+    unchanged = {each.camera.name: each for each in publishers if each.camera in cameras}
     for each in publishers:
-        if each.camera.name not in kept:
+        if each.camera.name not in unchanged:
             each.close()
-    return [kept.get(camera.name) or CameraPublisher(camera) for camera in cameras]
+    return [unchanged.get(camera.name) or CameraPublisher(camera) for camera in cameras]
 
 
 def serve(pipe: Connection, drawing_name: str) -> None:
-    """Draws what the simulation at the other end of a pipe asks for.
+    """Renders the images that the simulation requests through a pipe.
 
-    It sends the cameras, whenever they change, updates of the scene, and None at the end. What draws is resolved with
-    the first update, and set as the parameter ``~renderer`` of this node.
+    The simulation sends the cameras after every change, updates of the scene, and None at the end. The first update
+    selects the renderer, which is set as the parameter ``~renderer`` of this node.
 
     Args:
-        pipe: This end of the pipe.
+        pipe: End of the pipe.
         drawing_name: Parameter `~renderer` of the simulation.
     """
     publishers: list[CameraPublisher] = []
     renderer: Renderer | None = None
-    done, reported = 0, SceneReport(0, {})
+    images_done, last_report = 0, SceneReport(0, {})
     while not rospy.is_shutdown():
-        report = SceneReport(done, {each.camera.name: each.subscriptions for each in publishers if each.wanted})
-        if report != reported:
+        report = SceneReport(
+            images_done, {each.camera.name: each.subscriptions for each in publishers if each.has_subscribers}
+        )
+        if report != last_report:
             pipe.send(report)
-            reported = report
+            last_report = report
         if not pipe.poll(_POLL_S):
             continue
         update: SceneUpdate | tuple[Camera, ...] | None = pipe.recv()
         if update is None:
             return
         if isinstance(update, tuple):
-            publishers = replaced(publishers, update)
+            publishers = updated_publishers(publishers, update)
             continue
         if renderer is None:
             meshes = VisualMeshes(default_cache_folder())
             drawing = resolved_drawing(drawing_name)
-            rospy.loginfo("cameras are drawn by the renderer '%s'", drawing.value)
-            rospy.set_param("~renderer", drawing.value)  # for records of what drew the images
+            rospy.loginfo("cameras use the renderer '%s'", drawing.value)
+            rospy.set_param("~renderer", drawing.value)  # for the records of an experiment
             renderer = Renderer(drawing, meshes, rospy.logwarn)
         renderer.apply(update)
         for each in publishers:
             if each.camera.name in update.cameras:
                 each.publish(update, renderer)
-        done += 1
+        images_done += 1
 
 
-def _keep_the_engine_off_the_terminal() -> None:
-    """Leaves the terminal to Python: the engine and graphics drivers write to it from C++."""
+def _silence_native_output() -> None:
+    """Discards terminal output of the engine and of graphics drivers in C++, and keeps Python's output."""
     sys.stdout, sys.stderr = (os.fdopen(os.dup(stream), "w", buffering=1) for stream in (1, 2))
-    with open(os.devnull, "w") as nothing:
+    with open(os.devnull, "w") as devnull:
         for stream in (1, 2):
-            os.dup2(nothing.fileno(), stream)
+            os.dup2(devnull.fileno(), stream)
 
 
 def main() -> int:
-    """Runs the node; arguments: number of the open file that leads to the simulation, renderer.
+    """Runs the node; its arguments are the file descriptor of the pipe and the renderer.
 
     Returns:
         Exit code: 0.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    _keep_the_engine_off_the_terminal()
+    _silence_native_output()
     os.nice(_NICENESS)
     arguments = rospy.myargv(sys.argv)
-    # Without simulated time: messages carry that of the simulation, and nothing here waits.
+    # Simulated time is not needed, because the simulation sends the times of messages.
     rospy.init_node(ros_names.CAMERAS_NODE, disable_rostime=True)
     try:
         serve(Connection(int(arguments[1])), arguments[2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulation's end of the cameras: sends what changed to the process that draws, when somebody subscribes."""
+"""Controls the process that renders cameras: sends changes of the scene while a camera has subscribers."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _END_TIMEOUT_S = 5.0
 
 
 class CameraProcess:
-    """Cameras that are drawn in another process, which is started once there is a camera.
+    """Runs the cameras in another process, which starts with the first camera.
 
-    Physics never waits for it: while an image is drawn, no other is asked for, and the next one is late. A new
-    subscriber gets an image of now, also while time stands still.
+    The physics never waits for the process: while an image is rendered, no other image is requested, so the next image
+    may be late. A new subscriber gets an image of the current state, even while time is stopped.
 
     Args:
-        make_tracker: Makes what describes the things they see; called when there is a camera.
-        fixed: Cameras that stay.
-        renderer: Parameter `~renderer`, what draws.
+        make_tracker: Function that creates the scene tracker; called for the first camera.
+        fixed: Cameras of the parameter `~sensors`, which are never removed.
+        renderer: Value of the parameter `~renderer`.
     """
 
     def __init__(self, make_tracker: Callable[[], SceneTracker], fixed: Sequence[Camera], renderer: str) -> None:
@@ -49,7 +49,7 @@ class CameraProcess:
         self._connected = False
 
     def connect(self) -> None:
-        """Starts the process, now or with the first camera."""
+        """Starts the process, immediately or with the first camera."""
         self._connected = True
         if not self._cameras:
             return
@@ -74,10 +74,10 @@ class CameraProcess:
                 )  # fmt: skip
 
     def set_cameras(self, cameras: Sequence[Camera]) -> None:
-        """Takes the cameras of all models, which come and go; called by the loop's thread.
+        """Sets the cameras of all models, which are added and removed; called by the loop's thread.
 
         Args:
-            cameras: All of them, without those that stay.
+            cameras: All cameras except the fixed cameras.
         """
         wanted = {camera.name: camera for camera in (*self._fixed, *cameras)}
         if wanted == self._cameras:
@@ -89,7 +89,7 @@ class CameraProcess:
         if self._process is None:
             self.connect()
         elif self._pipe is not None:
-            with contextlib.suppress(OSError):  # it has ended, and the log says so
+            with contextlib.suppress(OSError):  # the process has ended, which the log reports
                 self._send_cameras(self._pipe)
 
     def _listen(self, pipe: Connection, process: subprocess.Popen[bytes]) -> None:
@@ -103,10 +103,10 @@ class CameraProcess:
             self._report = SceneReport(0, {})
         if self._pipe is not None and not rospy.is_shutdown():
             code = process.wait()
-            rospy.logerr("the process that draws what cameras see ended with code %d: cameras are silent now", code)
+            rospy.logerr("the camera process ended with code %d; cameras publish no more images", code)
 
     def tick(self, time_ns: int) -> None:
-        """Asks for the images that are due and have a subscriber; called by the loop's thread.
+        """Requests due images of cameras with subscribers; called by the loop's thread.
 
         Args:
             time_ns: Simulated time [ns].
@@ -126,7 +126,7 @@ class CameraProcess:
     def _is_due(self, name: str, time_ns: int) -> bool:
         period_ns = round(1e9 / self._cameras[name].rate_hz)
         due_ns = self._due_ns[name]
-        if due_ns - period_ns > time_ns:  # the clock went back
+        if due_ns - period_ns > time_ns:  # the clock was reset
             due_ns = time_ns
         if time_ns < due_ns:
             return False
@@ -140,7 +140,7 @@ class CameraProcess:
         pipe, self._pipe = self._pipe, None
         if pipe is None or self._process is None:
             return
-        with contextlib.suppress(OSError):  # it has ended before
+        with contextlib.suppress(OSError):  # the process has already ended
             pipe.send(None)
         try:
             self._process.wait(_END_TIMEOUT_S)
@@ -150,12 +150,12 @@ class CameraProcess:
 
 
 def configured_cameras(settings: Mapping[str, Any], robot: RobotBody | None, seed: int) -> list[Camera]:
-    """Reads the cameras of parameter `~sensors` (a `sensors_config.yaml`); what cannot be used is logged.
+    """Reads the cameras of the parameter `~sensors` (a `sensors_config.yaml`), and logs faults.
 
     Args:
         settings: Value of the parameter.
-        robot: The robot, if there is one.
-        seed: Of noise.
+        robot: The robot; None for a world without a robot.
+        seed: Random seed of the noise.
     """
     name = robot.body.name if robot is not None else ""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns this package's values into ROS messages and back."""
+"""Converts this package's values to and from ROS messages."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
-LARGEST_COORDINATE_M = MAX_LENGTH_M
-LARGEST_VELOCITY = 1e3
-"""Largest values with which the physics engine stays stable; larger ones in requests are refused [m/s, rad/s]."""
-LARGEST_FORCE = 1e5
-"""Largest forces and torques of requests [N, Nm]: with more, a small object leaves all reason within one step."""
-LARGEST_MASS = 1e6
-"""Largest masses and inertias of requests [kg, kg m^2]."""
+MAX_COORDINATE_M = MAX_LENGTH_M
+MAX_VELOCITY = 1e3
+"""Maximum velocities in requests, up to which the physics engine is stable [m/s, rad/s]."""
+MAX_FORCE = 1e5
+"""Maximum forces and torques in requests [N, Nm]; larger values make a small object unstable within one step."""
+MAX_MASS = 1e6
+"""Maximum masses and inertias in requests [kg, kg m^2]."""
 
 
 def pose_to_msg(pose: Pose) -> PoseMsg:
@@ -36,14 +36,14 @@ def pose_to_msg(pose: Pose) -> PoseMsg:
 
 
 def pose_from_msg(message: PoseMsg) -> Pose:
-    """Returns the pose of a message; an orientation of four zeros is the identity.
+    """Returns the pose of a message; an orientation with four zeros is the identity.
 
     Raises:
-        ValueError: A number is not finite or beyond all reason, or the quaternion is far from unit length.
+        ValueError: A number is not finite or too large, or the quaternion is far from unit length.
     """
     p, q = message.position, message.orientation
     position = (p.x, p.y, p.z)
-    check_numbers(position, "position", LARGEST_COORDINATE_M, "m")
+    check_numbers(position, "position", MAX_COORDINATE_M, "m")
     return Pose(position, normalised_quaternion((q.x, q.y, q.z, q.w)))
 
 
@@ -52,12 +52,12 @@ def vector_from_msg(message: Vector3 | Point, what: str, bound: float, unit: str
 
     Args:
         message: The vector or point.
-        what: Named in the error.
-        bound: Largest size of each number.
-        unit: Of the numbers.
+        what: Name of the value for the error message.
+        bound: Maximum magnitude of each number.
+        unit: Unit of the numbers for the error message.
 
     Raises:
-        ValueError: A number is not finite or larger.
+        ValueError: A number is not finite or too large.
     """
     values = (message.x, message.y, message.z)
     check_numbers(values, what, bound, unit)
@@ -65,7 +65,17 @@ def vector_from_msg(message: Vector3 | Point, what: str, bound: float, unit: str
 
 
 def check_numbers(values: Sequence[float], what: str, bound: float, unit: str) -> None:
-    """Raises ValueError where a number is not finite or larger than a bound, with what it is and its unit."""
+    """Checks that numbers are finite and within a bound.
+
+    Args:
+        values: The numbers.
+        what: Name of the value for the error message.
+        bound: Maximum magnitude of each number.
+        unit: Unit of the numbers for the error message.
+
+    Raises:
+        ValueError: A number is not finite or too large.
+    """
     if not all(math.isfinite(value) and abs(value) <= bound for value in values):
         raise ValueError(f"{what} {list(values)} is not allowed; give finite numbers of at most {bound:g} {unit}")
 
@@ -79,37 +89,37 @@ def twist_from_msg(message: TwistMsg) -> Twist:
     """Returns the twist of a message.
 
     Raises:
-        ValueError: A number is not finite or beyond all reason.
+        ValueError: A number is not finite or too large.
     """
     linear = (message.linear.x, message.linear.y, message.linear.z)
     angular = (message.angular.x, message.angular.y, message.angular.z)
-    check_numbers(linear, "linear velocity", LARGEST_VELOCITY, "m/s")
-    check_numbers(angular, "angular velocity", LARGEST_VELOCITY, "rad/s")
+    check_numbers(linear, "linear velocity", MAX_VELOCITY, "m/s")
+    check_numbers(angular, "angular velocity", MAX_VELOCITY, "rad/s")
     return Twist(linear, angular)
 
 
 def state_from_msgs(pose: PoseMsg, twist: TwistMsg) -> BodyState:
-    """Returns the state two messages describe.
+    """Returns the state in a pose message and a twist message.
 
     Raises:
-        ValueError: A number is not finite, or the quaternion is far from unit length.
+        ValueError: A number is not finite or too large, or the quaternion is far from unit length.
     """
     return BodyState(pose_from_msg(pose), twist_from_msg(twist))
 
 
 def collision_object_id(model: str, link: str) -> str:
-    """Returns the name a simulated link has in the planning scene."""
+    """Returns the id of a simulated link in the planning scene."""
     return f"{model}__{link}"
 
 
 def link_to_collision_object(model: str, link: specs.Link, frame: str, pose: Pose) -> CollisionObject:
-    """Returns a link's collision shapes as they are: meshes triangle for triangle, primitives as primitives.
+    """Returns the exact collision shapes of a link, with the triangles of meshes and with primitives.
 
     Args:
-        model: Instance name of the model.
+        model: Name of the model in the world.
         link: The link.
-        frame: Frame the pose is given in.
-        pose: Of the link.
+        frame: Reference frame of the pose.
+        pose: Pose of the link in the reference frame.
 
     Raises:
         DescriptionError: A mesh cannot be read any more.
@@ -149,12 +159,12 @@ def mesh_to_msg(mesh: TriangleMesh) -> MeshMsg:
 
 
 def attached_object(item: CollisionObject, link: str, touch_links: list[str]) -> AttachedCollisionObject:
-    """Returns an object attached to a robot link.
+    """Returns an object that is attached to a robot link.
 
     Args:
-        item: The object, its pose in the frame of the link.
+        item: The object, with its pose in the link frame.
         link: Name of the link.
-        touch_links: Links that may touch it.
+        touch_links: Links that may touch the object.
     """
     message = AttachedCollisionObject()
     message.link_name = link

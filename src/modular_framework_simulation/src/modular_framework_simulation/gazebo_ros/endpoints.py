@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services and subscriptions whose work is done by the simulation loop.
 
-Each handler runs in a thread of its own. A failure is reported in the answer, by `success` and `status_message`, or, by
-types that have no room for it, as a failed call with the reason; never by an exception that ends something.
+Each handler runs in its own thread. A failure is reported in the response, by `success` and `status_message`, or as a
+failed call for types without these fields. A failure never ends the loop or the node.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 
-_ANSWER_TIMEOUT_S = 30.0
+_RESPONSE_TIMEOUT_S = 30.0
 _TOPIC_QUEUE_SIZE = 10
 
 Work = Callable[[Any], Any]
-"""Takes a request or a message; returns the answer."""
+"""Function that handles a request or message and returns the response."""
 
 
 class Endpoints:
     """Opens services and subscriptions, and closes them together.
 
     Args:
-        loop: Does the work.
+        loop: Loop that does the work.
     """
 
     def __init__(self, loop: SimulationLoop) -> None:
@@ -35,48 +35,72 @@ class Endpoints:
         self._opened: list[Any] = []
 
     def in_loop(self, what: str, work: Callable[[], Any]) -> Any:
-        """Has work done by the loop's thread, and returns its result."""
-        return self._loop.requests.call(what, work, _ANSWER_TIMEOUT_S)
+        """Runs work in the loop's thread and returns the result."""
+        return self._loop.requests.call(what, work, _RESPONSE_TIMEOUT_S)
 
     def serve(self, name: str, kind: Any, work: Work) -> None:
-        """Advertises a service whose answer has `success` and `status_message`; the loop does its work."""
-        self.serve_beside(name, kind, lambda request: self.in_loop(name, lambda: work(request)))
+        """Advertises a service with `success` and `status_message`, handled by the loop's thread.
 
-    def serve_beside(self, name: str, kind: Any, work: Work) -> None:
-        """Advertises such a service whose work is done in the thread of the request, beside the loop."""
+        Args:
+            name: Name of the service.
+            kind: Type of the service.
+            work: Function that handles a request.
+        """
+        self.serve_outside_loop(name, kind, lambda request: self.in_loop(name, lambda: work(request)))
+
+    def serve_outside_loop(self, name: str, kind: Any, work: Work) -> None:
+        """Advertises a service with `success` and `status_message`, handled by the request's thread.
+
+        Args:
+            name: Name of the service.
+            kind: Type of the service.
+            work: Function that handles a request.
+        """
 
         def handle(request: Any) -> Any:
             try:
-                answer = work(request)
+                response = work(request)
                 self._note(name, request)
-                return answer
-            except Exception as error:  # any request must get an answer and must not end the node
+                return response
+            except Exception as error:  # any request must get a response and must not end the node
                 return kind._response_class(success=False, status_message=f"{name}: {_reason(name, error)}")
 
         self._opened.append(rospy.Service(name, kind, handle))
 
     def command(self, name: str, kind: Any, work: Callable[[Any], None]) -> None:
-        """Advertises a service with an empty answer; where the work fails, so does the call, with the reason."""
+        """Advertises a service with an empty response; if the work fails, the call fails with the reason.
+
+        Args:
+            name: Name of the service.
+            kind: Type of the service.
+            work: Function that handles a request in the loop's thread.
+        """
 
         def handle(request: Any) -> Any:
             try:
                 self.in_loop(name, lambda: work(request))
                 self._note(name, request)
-            except Exception as error:  # any request must get an answer and must not end the node
+            except Exception as error:  # any request must get a response and must not end the node
                 raise rospy.ServiceException(f"{name}: {_reason(name, error)}") from None
             return kind._response_class()
 
         self._opened.append(rospy.Service(name, kind, handle))
 
     def subscribe(self, topic: str, kind: Any, work: Callable[[Any], None]) -> None:
-        """Subscribes to a topic; the loop does the work, and a failure is logged."""
+        """Subscribes to a topic; a failure is logged.
+
+        Args:
+            topic: Name of the topic.
+            kind: Type of the messages.
+            work: Function that handles a message in the loop's thread.
+        """
 
         def handle(message: Any) -> None:
             def attempt() -> None:
                 try:
                     work(message)
                     self._note(topic, message)
-                except Exception as error:  # no message may end the loop
+                except Exception as error:  # a message must not end the loop
                     _reason(f"{topic} (topic)", error)
 
             self._loop.requests.post(attempt)
@@ -84,12 +108,12 @@ class Endpoints:
         self._opened.append(rospy.Subscriber(topic, kind, handle, queue_size=_TOPIC_QUEUE_SIZE))
 
     def _note(self, name: str, message: Any) -> None:
-        """Notes a request or message that changed the world."""
-        if ros_names.READING not in name:
+        """Records a request or message that changed the world."""
+        if ros_names.READ_ONLY_PREFIX not in name:
             self._loop.referee.note(name, caller_of(message))
 
     def close(self) -> None:
-        """Closes everything; may be called twice."""
+        """Closes all services and subscriptions; may be called twice."""
         while self._opened:
             endpoint = self._opened.pop()
             if isinstance(endpoint, rospy.Service):
@@ -99,12 +123,12 @@ class Endpoints:
 
 
 def caller_of(message: Any) -> str:
-    """Returns the name that the sender of a request or message gave; ROS 1 does not verify it."""
+    """Returns the sender's name in a request or message, which ROS 1 does not verify."""
     return str((getattr(message, "_connection_header", None) or {}).get("callerid", ""))
 
 
 def _reason(name: str, error: Exception) -> str:
-    """Returns why something failed, and logs it."""
+    """Returns the reason for a failure, and logs the reason."""
     known = isinstance(error, SimulationError | ValueError)
     text = str(error) if known else f"unexpected {type(error).__name__}: {error}"
     rospy.logerr("%s: %s", name, text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services and topics with which Gazebo is asked, answered by the simulated world."""
+"""Gazebo's services and topics, provided by the simulated world."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from modular_framework_simulation.models.sdf_resources import Resources
 
 
 class GazeboServices:
-    """Advertises and answers everything below /gazebo that gazebo_ros has.
+    """Serves all names of gazebo_ros below /gazebo.
 
     See `ModelServices`, `LinkServices`, `JointServices`, `PhysicsServices` and `LightServices`.
 
     Args:
-        loop: The simulation loop.
-        resources: Where spawned models find what they refer to.
+        loop: Loop with the world and the pacer.
+        resources: Folders and packages for the files of spawned models.
     """
 
     def __init__(self, loop: SimulationLoop, resources: Resources) -> None:
@@ -35,15 +35,15 @@ class GazeboServices:
         )
 
     def connect(self) -> None:
-        """Opens everything."""
+        """Opens all services and subscriptions."""
         for group in self._groups:
             group.connect(self._endpoints)
 
     def refresh(self) -> None:
-        """Publishes the settings of the physics, after the world has begun again with those of the start."""
+        """Publishes the physics settings after a restart has restored the initial settings."""
         self._physics.refresh()
 
     def close(self) -> None:
-        """Closes everything; may be called twice."""
+        """Closes all services and subscriptions; may be called twice."""
         self._physics.close()
         self._endpoints.close()

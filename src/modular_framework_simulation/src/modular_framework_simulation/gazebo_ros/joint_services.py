@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services about joints: their state and settings, and efforts on them."""
+"""Services for joints: states, settings and efforts."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from modular_framework_simulation.physics.part_names import PartName, find_joint
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import JointSettings
 
-_WITHOUT_COUNTERPART = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor")
-"""Fields of ODEJointProperties that the physics engine has nothing like."""
+_UNSUPPORTED_FIELDS = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor")
+"""Fields of ODEJointProperties that the physics engine does not support."""
 
 
 class JointServices:
-    """Answers /gazebo/{get,set}_joint_properties, apply_joint_effort and clear_joint_forces.
+    """Serves /gazebo/{get,set}_joint_properties, apply_joint_effort and clear_joint_forces.
 
     Args:
-        world: Used by the loop's thread only.
+        world: The world, only used by the loop's thread.
     """
 
     def __init__(self, world: PhysicsWorld) -> None:
@@ -51,46 +51,50 @@ class JointServices:
     def _get_properties(self, request: Any) -> Any:
         joint = self._joint(request.joint_name)
         body = self._world.body(joint.model)
-        answer = srv.GetJointPropertiesResponse(success=True, status_message="read the properties of the joint")
+        response = srv.GetJointPropertiesResponse(success=True, status_message="read the properties of the joint")
         if body.spec is not None:
             kind = next(each.kind for each in body.spec.joints if each.name == joint.part)
-            answer.type = getattr(answer, kind.name)
+            response.type = getattr(response, kind.name)
         if joint.part not in movable_joints(body):
-            return answer
+            return response
         measured = measured_joint(self._world.engine, body, joint.part)
         if body.spec is None:
-            answer.type = _kind_of_robot_joint(measured)
-        answer.damping, answer.position, answer.rate = [measured.damping], [measured.position], [measured.velocity]
-        return answer
+            response.type = _kind_of_robot_joint(measured)
+        response.damping, response.position, response.rate = (
+            [measured.damping],
+            [measured.position],
+            [measured.velocity],
+        )
+        return response
 
     def _set_properties(self, request: Any) -> Any:
-        joint, given = self._joint(request.joint_name), request.ode_joint_config
-        unsupported = [name for name in _WITHOUT_COUNTERPART if getattr(given, name)]
+        joint, config = self._joint(request.joint_name), request.ode_joint_config
+        unsupported = [name for name in _UNSUPPORTED_FIELDS if getattr(config, name)]
         if unsupported:
             raise ValueError(
                 f"{', '.join(unsupported)} of ODE have no counterpart in this physics engine; "
                 "leave them empty; allowed: damping, hiStop, loStop, fmax, vel"
             )
         settings = JointSettings(
-            damping=_one(given.damping, "damping", 0.0),
-            motor_velocity=_one(given.vel, "vel", -math.inf),
-            motor_effort=_one(given.fmax, "fmax", 0.0),
+            damping=_single_value(config.damping, "damping", 0.0),
+            motor_velocity=_single_value(config.vel, "vel", -math.inf),
+            motor_effort=_single_value(config.fmax, "fmax", 0.0),
         )
         if settings.motor_velocity is not None and settings.motor_effort is None:
-            present = self._world.body(joint.model).joint_settings.get(joint.part, JointSettings())
-            if present.motor_effort is None:
-                raise ValueError("vel without fmax: a motor without effort does nothing; give both")
-        change = JointChange(_limit(given.loStop, "loStop"), _limit(given.hiStop, "hiStop"), settings)
+            current = self._world.body(joint.model).joint_settings.get(joint.part, JointSettings())
+            if current.motor_effort is None:
+                raise ValueError("got vel without fmax; a motor without maximum effort has no effect; give both")
+        change = JointChange(_limit(config.loStop, "loStop"), _limit(config.hiStop, "hiStop"), settings)
         set_joint(self._world, joint, change)
         return srv.SetJointPropertiesResponse(True, f"set the properties of joint '{joint.scoped}'")
 
     def _apply_effort(self, request: Any) -> Any:
         joint = self._joint(request.joint_name)
         tree_with_joint(self._world.body(joint.model), joint.part)
-        conversions.check_numbers((request.effort,), "effort", conversions.LARGEST_FORCE, "Nm or N")
+        conversions.check_numbers((request.effort,), "effort", conversions.MAX_FORCE, "Nm or N")
         duration_ns = request.duration.to_nsec()
         if duration_ns == 0:
-            return srv.ApplyJointEffortResponse(True, "the duration is 0: nothing acts; a negative one has no end")
+            return srv.ApplyJointEffortResponse(True, "the duration is 0: no effort acts; use -1 for no end")
         interval = Interval.from_request(self._world.time_ns, request.start_time.to_nsec(), duration_ns)
         self._world.forces.add_effort(JointEffort(joint, request.effort, interval))
         return srv.ApplyJointEffortResponse(True, f"the effort acts on '{joint.scoped}' {describe(interval)}")
@@ -106,20 +110,20 @@ def _kind_of_robot_joint(measured: JointMeasurement) -> int:
     return int(kinds.CONTINUOUS if math.isinf(measured.upper) else kinds.REVOLUTE)
 
 
-def _one(values: Sequence[float], what: str, least: float) -> float | None:
-    """Returns the value of the only axis; None where none is given."""
+def _single_value(values: Sequence[float], what: str, minimum: float) -> float | None:
+    """Returns the value of the single axis; None if not given."""
     if len(values) > 1:
-        raise ValueError(f"{what} has {len(values)} values; a joint here has one axis: give one")
+        raise ValueError(f"{what} has {len(values)} values; expected one value, because every joint has one axis")
     for value in values:
-        conversions.check_numbers((value,), what, conversions.LARGEST_FORCE, "in SI units")
-        if value < least:
-            raise ValueError(f"{what} is {value:g}; allowed: {least:g} or greater")
+        conversions.check_numbers((value,), what, conversions.MAX_FORCE, "in SI units")
+        if value < minimum:
+            raise ValueError(f"{what} is {value:g}; allowed: {minimum:g} or greater")
         return float(value)
     return None
 
 
 def _limit(values: Sequence[float], what: str) -> float | None:
-    """Returns the limit of the only axis, which may be infinite; None where none is given."""
+    """Returns the limit of the single axis, which may be infinite; None if not given."""
     if len(values) == 1 and math.isinf(values[0]):
         return float(values[0])
-    return _one(values, what, -math.inf)
+    return _single_value(values, what, -math.inf)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services about lights, of which this simulation has none."""
+"""Light services, which this simulation does not support."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
 
 
 class LightServices:
-    """Answers /gazebo/{get,set}_light_properties and delete_light: they are not supported, and the answer says so."""
+    """Responds to /gazebo/{get,set}_light_properties and delete_light with an error, as lights are not supported."""
 
     def connect(self, endpoints: Endpoints) -> None:
         """Advertises the services."""
@@ -21,11 +21,11 @@ class LightServices:
             (ros_names.SET_LIGHT_PROPERTIES, srv.SetLightProperties),
             (ros_names.DELETE_LIGHT, srv.DeleteLight),
         ):
-            endpoints.serve_beside(name, kind, _refuse)
+            endpoints.serve_outside_loop(name, kind, _refuse)
 
 
 def _refuse(request: Any) -> Any:
     raise ValueError(
-        f"light '{request.light_name}': lights are not supported: this simulation draws with a light of its own, "
-        "and those of world files have no effect"
+        f"light '{request.light_name}': lights are not supported; this simulation renders with its own light, "
+        "and lights of world files have no effect"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services and a topic about models: they come, go, are read, and are put elsewhere."""
+"""Services and a topic for models: spawning, deleting, reading and placing."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from modular_framework_simulation.physics.physics_world import WORLD_FRAMES
 
 
 class ModelServices:
-    """Answers /gazebo/spawn_{sdf,urdf,gazebo}_model, delete_model, {get,set}_model_state, get_model_properties.
+    """Serves /gazebo/spawn_{sdf,urdf,gazebo}_model, delete_model, {get,set}_model_state, get_model_properties.
 
-    Also set_model_configuration. Subscribes /gazebo/set_model_state (gazebo_msgs/ModelState).
+    Also serves set_model_configuration. Subscribes: /gazebo/set_model_state (gazebo_msgs/ModelState).
 
     Args:
-        loop: The simulation loop.
-        resources: Where spawned models find what they refer to.
+        loop: Loop with the world.
+        resources: Folders and packages for the files of spawned models.
     """
 
     def __init__(self, loop: SimulationLoop, resources: Resources) -> None:
@@ -41,27 +41,27 @@ class ModelServices:
         self._reads: Counter[str] = Counter()
 
     def connect(self, endpoints: Endpoints) -> None:
-        """Advertises the services and subscribes."""
+        """Advertises the services and subscribes to the topic."""
         self._endpoints = endpoints
-        endpoints.serve_beside(ros_names.SPAWN_SDF_MODEL, srv.SpawnModel, self._spawn_sdf)
-        endpoints.serve_beside(ros_names.SPAWN_URDF_MODEL, srv.SpawnModel, self._spawn_urdf)
-        endpoints.serve_beside(ros_names.SPAWN_GAZEBO_MODEL, srv.SpawnModel, self._spawn_gazebo)
+        endpoints.serve_outside_loop(ros_names.SPAWN_SDF_MODEL, srv.SpawnModel, self._spawn_sdf)
+        endpoints.serve_outside_loop(ros_names.SPAWN_URDF_MODEL, srv.SpawnModel, self._spawn_urdf)
+        endpoints.serve_outside_loop(ros_names.SPAWN_GAZEBO_MODEL, srv.SpawnModel, self._spawn_gazebo)
         endpoints.serve(ros_names.DELETE_MODEL, srv.DeleteModel, self._delete)
         endpoints.serve(ros_names.GET_MODEL_STATE, srv.GetModelState, self._get_state)
         endpoints.serve(ros_names.SET_MODEL_STATE, srv.SetModelState, self._set_state)
         endpoints.serve(ros_names.SET_MODEL_CONFIGURATION, srv.SetModelConfiguration, self._set_configuration)
         endpoints.serve(ros_names.GET_MODEL_PROPERTIES, srv.GetModelProperties, self._get_properties)
-        endpoints.subscribe(ros_names.SET_MODEL_STATE, msg.ModelState, self._put)
+        endpoints.subscribe(ros_names.SET_MODEL_STATE, msg.ModelState, self._apply_state)
 
     def _frame(self, name: str) -> str:
         return find_frame(self._world.bodies, name, WORLD_FRAMES)
 
     def _spawn_sdf(self, request: Any) -> Any:
-        """Spawns a model in SDF, or, as Gazebo does, in URDF."""
+        """Spawns a model in SDF or, as in Gazebo, in URDF."""
         source = f"spawn request of '{request.model_name}'"
         is_urdf = parse_xml(request.model_xml, source).tag == "robot"
-        read = read_urdf_model if is_urdf else read_model_text
-        return self._spawn(ros_names.SPAWN_SDF_MODEL, request, read(request.model_xml, source, self._resources))
+        read_model = read_urdf_model if is_urdf else read_model_text
+        return self._spawn(ros_names.SPAWN_SDF_MODEL, request, read_model(request.model_xml, source, self._resources))
 
     def _spawn_urdf(self, request: Any) -> Any:
         source = f"spawn request of '{request.model_name}'"
@@ -73,11 +73,11 @@ class ModelServices:
         return self._spawn_sdf(request)
 
     def _spawn(self, service: str, request: Any, model: Model) -> Any:
-        # Decomposing meshes may take seconds: it is done in this thread, while the loop continues.
+        # Decomposing meshes may take seconds, so this thread prepares the model while the loop continues.
         name = request.model_name or model.name
         model = dataclasses.replace(model, name=name, namespace=request.robot_namespace)
         if model.name in WORLD_FRAMES:
-            raise ValueError(f"a model cannot have the name '{model.name}': it stands for the frame of the world")
+            raise ValueError(f"a model cannot have the name '{model.name}', which stands for the world frame")
         prepared = self._world.prepare(model)
         initial = conversions.pose_from_msg(request.initial_pose) @ model.pose
 
@@ -90,7 +90,7 @@ class ModelServices:
 
     def _delete(self, request: Any) -> Any:
         if self._world.body(request.model_name).spec is None:
-            raise ModelChangeError(f"'{request.model_name}' is the robot that the controllers drive: it stays")
+            raise ModelChangeError(f"'{request.model_name}' is the controlled robot and cannot be deleted")
         self._world.delete(request.model_name)
         del self._reads[request.model_name]
         return srv.DeleteModelResponse(True, f"deleted model '{request.model_name}'")
@@ -100,38 +100,38 @@ class ModelServices:
         self._world.body(request.model_name)
         state = self._world.state_relative_to(request.model_name, reference)
         self._reads[request.model_name] += 1
-        answer = srv.GetModelStateResponse(success=True, status_message="read the state of the model")
-        answer.header.seq = self._reads[request.model_name]
-        answer.header.stamp = stamp_of(self._world)
-        answer.header.frame_id = ros_names.WORLD_FRAME if reference in WORLD_FRAMES else reference
-        answer.pose = conversions.pose_to_msg(state.pose)
-        answer.twist = conversions.twist_to_msg(state.twist)
-        return answer
+        response = srv.GetModelStateResponse(success=True, status_message="read the state of the model")
+        response.header.seq = self._reads[request.model_name]
+        response.header.stamp = stamp_of(self._world)
+        response.header.frame_id = ros_names.WORLD_FRAME if reference in WORLD_FRAMES else reference
+        response.pose = conversions.pose_to_msg(state.pose)
+        response.twist = conversions.twist_to_msg(state.twist)
+        return response
 
     def _set_state(self, request: Any) -> Any:
-        self._put(request.model_state)
-        return srv.SetModelStateResponse(True, f"put model '{request.model_state.model_name}'")
+        self._apply_state(request.model_state)
+        return srv.SetModelStateResponse(True, f"set the state of model '{request.model_state.model_name}'")
 
-    def _put(self, model_state: Any) -> None:
+    def _apply_state(self, model_state: Any) -> None:
         if self._world.body(model_state.model_name).spec is None:
-            raise ModelChangeError(f"'{model_state.model_name}' is the robot: it stands where its description says")
+            raise ModelChangeError(f"'{model_state.model_name}' is the robot, whose base pose is fixed")
         state = conversions.state_from_msgs(model_state.pose, model_state.twist)
         self._world.set_state(model_state.model_name, state, self._frame(model_state.reference_frame))
 
     def _set_configuration(self, request: Any) -> Any:
         names, values = request.joint_names, request.joint_positions
         if len(names) != len(values) or not all(math.isfinite(value) for value in values):
-            raise ValueError(f"got {len(names)} joints and positions {list(values)}; give each joint one finite number")
+            raise ValueError(f"got {len(names)} joints and positions {list(values)}; give one finite number per joint")
         self._loop.set_joints(request.model_name, dict(zip(names, values, strict=True)))
         return srv.SetModelConfigurationResponse(True, f"set {len(names)} joints of model '{request.model_name}'")
 
     def _get_properties(self, request: Any) -> Any:
         body = self._world.body(request.model_name)
-        answer = srv.GetModelPropertiesResponse(success=True, status_message="read the properties of the model")
-        answer.body_names = body.link_names()
-        answer.canonical_body_name = answer.body_names[0]
-        answer.joint_names = body.joint_names()
-        answer.is_static = body.static and body.spec is not None
+        response = srv.GetModelPropertiesResponse(success=True, status_message="read the properties of the model")
+        response.body_names = body.link_names()
+        response.canonical_body_name = response.body_names[0]
+        response.joint_names = body.joint_names()
+        response.is_static = body.static and body.spec is not None
         if body.spec is not None:
-            answer.geom_names = [each.name for link in body.spec.links for each in link.collisions]
-        return answer
+            response.geom_names = [each.name for link in body.spec.links for each in link.collisions]
+        return response

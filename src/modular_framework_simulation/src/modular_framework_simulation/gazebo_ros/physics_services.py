@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services about the world as a whole: its physics, its time, and its beginning."""
+"""Services for the whole world: physics settings, time and resets."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 
 
 class PhysicsServices:
-    """Answers /gazebo/{get,set}_physics_properties, get_world_properties, {pause,unpause}_physics, reset_*.
+    """Serves /gazebo/{get,set}_physics_properties, get_world_properties, {pause,unpause}_physics and reset_*.
 
     Serves dynamic_reconfigure in /gazebo: set_parameters, parameter_descriptions and parameter_updates.
 
     Args:
-        loop: The simulation loop.
+        loop: Loop with the world and the pacer.
     """
 
     def __init__(self, loop: SimulationLoop) -> None:
@@ -42,7 +42,7 @@ class PhysicsServices:
         """Advertises the services."""
         self._endpoints = endpoints
         endpoints.serve(ros_names.GET_PHYSICS_PROPERTIES, srv.GetPhysicsProperties, self._get_properties)
-        endpoints.serve_beside(ros_names.SET_PHYSICS_PROPERTIES, srv.SetPhysicsProperties, self._set_properties)
+        endpoints.serve_outside_loop(ros_names.SET_PHYSICS_PROPERTIES, srv.SetPhysicsProperties, self._set_properties)
         endpoints.serve(ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties, self._get_world)
         endpoints.command(ros_names.PAUSE_PHYSICS, Empty, lambda _request: self._loop.pause())
         endpoints.command(ros_names.UNPAUSE_PHYSICS, Empty, lambda _request: self._loop.unpause())
@@ -51,17 +51,17 @@ class PhysicsServices:
         self._reconfiguration.connect()
 
     def refresh(self) -> None:
-        """Lets dynamic_reconfigure publish the settings as they are, after something else has changed them."""
+        """Makes dynamic_reconfigure publish the current settings after a change by another service."""
         self._reconfiguration.refresh()
 
     def close(self) -> None:
-        """Ends dynamic_reconfigure; may be called twice."""
+        """Closes dynamic_reconfigure; may be called twice."""
         self._reconfiguration.close()
 
     @property
     def values(self) -> PhysicsValues:
-        """The settings that dynamic_reconfigure reads and replaces."""
-        values: PhysicsValues = self._endpoints.in_loop(ros_names.SET_PARAMETERS, self._physics.present)
+        """Returns the settings for dynamic_reconfigure; the setter applies new settings."""
+        values: PhysicsValues = self._endpoints.in_loop(ros_names.SET_PARAMETERS, self._physics.current)
         return values
 
     @values.setter
@@ -73,12 +73,12 @@ class PhysicsServices:
             raise rospy.ServiceException(f"{ros_names.SET_PARAMETERS}: {error}") from None
 
     def _get_properties(self, _request: Any) -> Any:
-        values = self._physics.present()
-        answer = srv.GetPhysicsPropertiesResponse(success=True, status_message="read the properties of the physics")
-        answer.time_step, answer.max_update_rate = values.time_step, values.max_update_rate
-        answer.pause = self._loop.paused
-        answer.gravity, answer.ode_config = gravity_to_msg(values), ode_to_msg(values)
-        return answer
+        values = self._physics.current()
+        response = srv.GetPhysicsPropertiesResponse(success=True, status_message="read the properties of the physics")
+        response.time_step, response.max_update_rate = values.time_step, values.max_update_rate
+        response.pause = self._loop.paused
+        response.gravity, response.ode_config = gravity_to_msg(values), ode_to_msg(values)
+        return response
 
     def _set_properties(self, request: Any) -> Any:
         values = values_from_request(request)
@@ -86,7 +86,7 @@ class PhysicsServices:
         self._reconfiguration.refresh()
         text = "set the properties of the physics"
         if ignored:
-            text += f"; without effect, because this engine has nothing like them: {', '.join(ignored)}"
+            text += f"; without effect, because this engine does not support them: {', '.join(ignored)}"
             rospy.logwarn("%s: %s", ros_names.SET_PHYSICS_PROPERTIES, text)
         return srv.SetPhysicsPropertiesResponse(True, text)
 

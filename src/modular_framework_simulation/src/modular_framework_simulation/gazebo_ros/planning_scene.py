@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the planning scene of move_group equal to the simulated world.
+"""Synchronizes the planning scene of move_group with the simulated world.
 
-A thread of its own compares the latest snapshot of the world with what the scene has and sends the differences to
-move_group's service. What the scene has is read back after changes and from time to time: other nodes change it too,
-and move_group may have been started again. The simulation loop only ever hands over a snapshot and never waits.
+A separate thread compares the latest snapshot of the world with the scene, and sends the differences to move_group's
+service. The thread reads the scene again after changes and periodically, because other nodes also change the scene and
+move_group may have restarted. The simulation loop only passes snapshots and never waits.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5
 _RETRY_PERIOD_S = 0.5
 _COMPARE_PERIOD_S = 2.0
-"""Longest time between two comparisons while no change of the scene is published [s]."""
-_COMPARE_PAUSE_S, _COMPARE_SHARE = 0.3, 0.1
-"""After a comparison, while the scene changes all the time, as it does while the robot moves: so long at least, and so
-long that comparisons take no more than this share of the time (a held mesh comes with all its triangles)."""
+"""Maximum time between two comparisons if no change of the scene is published [s]."""
+_COMPARE_PAUSE_S, _MAX_COMPARE_FRACTION = 0.3, 0.1
+"""Minimum pause after a comparison while the scene changes continuously, as during robot motions [s], and maximum
+fraction of time for comparisons; the scene contains all triangles of a held mesh."""
 _OBJECTS = PlanningSceneComponents(
     PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
 )
@@ -54,14 +54,14 @@ class PlanningScenePublisher:
     """Sends the simulated world to the planning scene of move_group.
 
     Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene) and /get_planning_scene
-    (moveit_msgs/GetPlanningScene), whenever they are there.
-    Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to notice that something changed.
+    (moveit_msgs/GetPlanningScene), whenever the services are available.
+    Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to detect changes of the scene.
     """
 
     def __init__(self) -> None:
         self._changes = SceneChanges()
         self._snapshot: WorldSnapshot | None = None
-        self._news = threading.Event()
+        self._wake = threading.Event()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="planning scene", daemon=True)
         self._server_uri = ""
@@ -69,7 +69,7 @@ class PlanningScenePublisher:
         self._scene_changed = threading.Event()
         self._compared_s = 0.0
         self._compare_pause_s = _COMPARE_PAUSE_S
-        self._last_problem = self._told_problem = ""
+        self._last_problem = self._logged_problem = ""
         self._synchronising = threading.Lock()
         self._exact_at = (-1, -1)
 
@@ -79,29 +79,29 @@ class PlanningScenePublisher:
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread, unless move_group makes it wait for an answer; may be called twice."""
+        """Stops the thread, unless the thread waits for a response of move_group; may be called twice."""
         self._stop.set()
-        self._news.set()
+        self._wake.set()
         if self._thread.is_alive():
             self._thread.join(timeout=1.0)
 
     def show(self, snapshot: WorldSnapshot) -> None:
-        """Passes the latest state of the world to the thread; never waits."""
+        """Passes the latest state of the world to the thread without waiting."""
         self._snapshot = snapshot
-        self._news.set()
+        self._wake.set()
 
     def is_up_to_date(self, time_ns: int, revision: int) -> bool:
-        """Returns whether the scene was brought in step with the world at a time [ns] and a revision."""
+        """Returns whether the scene was synchronized at a simulated time [ns] and a revision of the world."""
         return self._exact_at == (time_ns, revision)
 
     def bring_up_to_date(self, snapshot: WorldSnapshot) -> None:
-        """Makes the scene equal to a snapshot, to the last bit, and returns when it is; nothing without move_group.
+        """Waits until the scene exactly equals a snapshot; does nothing without move_group.
 
         Raises:
-            PlanningSceneError: move_group does not take the change.
+            PlanningSceneError: move_group rejects the change.
         """
         with self._synchronising:
-            if not self._server_is_there():
+            if not self._server_available():
                 return
             self._compared_s = 0.0
             self._scene_changed.set()
@@ -110,76 +110,76 @@ class PlanningScenePublisher:
             except (rospy.ServiceException, rospy.ROSException, OSError) as error:
                 self._fail(f"{type(error).__name__}: {error}")
             if self._last_problem:
-                raise PlanningSceneError(f"the planning scene is not in step with the world: {self._last_problem}")
+                raise PlanningSceneError(f"the planning scene differs from the simulated world: {self._last_problem}")
             self._exact_at = (snapshot.time_ns, snapshot.revision)
 
     def _on_scene_change(self, _message: rospy.AnyMsg) -> None:
         self._scene_changed.set()
-        self._news.set()
+        self._wake.set()
 
     def _run(self) -> None:
         while not self._stop.is_set() and not rospy.is_shutdown():
-            self._news.wait(timeout=1.0)
-            self._news.clear()
+            self._wake.wait(timeout=1.0)
+            self._wake.clear()
             snapshot = self._snapshot
             if snapshot is None:
                 continue
             try:
                 with self._synchronising:
                     pause_s = self._synchronise(snapshot)
-            except Exception as error:  # this thread must survive any failure of move_group or the network
+            except Exception as error:  # the thread must survive any failure of move_group or the network
                 pause_s = self._fail(f"{type(error).__name__}: {error}")
             end = time.monotonic() + pause_s
-            # A change of what is held is urgent: the next motion is planned with it.
+            # A change of the held objects is urgent, because the next motion depends on it.
             while time.monotonic() < end and _held_models(self._snapshot) == _held_models(snapshot):
                 if self._stop.wait(0.02):
                     return
 
     def _synchronise(self, snapshot: WorldSnapshot, exact: bool = False) -> float:
-        """Sends what is new; returns how long to rest afterwards [s]."""
-        if not self._server_is_there():
+        """Sends all changes; returns the pause until the next synchronization [s]."""
+        if not self._server_available():
             return _PRESENCE_PERIOD_S
         self._compare()
         changes = self._changes.towards(snapshot, exact)
         if not changes:
             self._last_problem = self._last_problem if not exact else ""
             return _SYNC_PERIOD_S
-        answer = rospy.ServiceProxy(ros_names.APPLY_PLANNING_SCENE, ApplyPlanningScene)(self._message(changes))
-        if not answer.success:
+        response = rospy.ServiceProxy(ros_names.APPLY_PLANNING_SCENE, ApplyPlanningScene)(self._message(changes))
+        if not response.success:
             names = sorted({conversions.collision_object_id(*change.key) for change in changes})
-            return self._fail(f"move_group refused a change of {', '.join(names)}")
+            return self._fail(f"move_group rejected a change of {', '.join(names)}")
         self._changes.confirm()
-        if self._told_problem:
-            rospy.loginfo("planning scene: in step with the simulated world again")
-        self._last_problem = self._told_problem = ""
+        if self._logged_problem:
+            rospy.loginfo("planning scene: synchronized with the simulated world again")
+        self._last_problem = self._logged_problem = ""
         return _SYNC_PERIOD_S
 
     def _compare(self) -> None:
-        """Reads which objects the scene has, where it changed or was not read for a while."""
-        begun = time.monotonic()
-        if begun - self._compared_s < (self._compare_pause_s if self._scene_changed.is_set() else _COMPARE_PERIOD_S):
+        """Reads the objects of the scene if the scene has changed or the last comparison is old."""
+        start_s = time.monotonic()
+        if start_s - self._compared_s < (self._compare_pause_s if self._scene_changed.is_set() else _COMPARE_PERIOD_S):
             return
         self._scene_changed.clear()
         scene = rospy.ServiceProxy(ros_names.GET_PLANNING_SCENE, GetPlanningScene)(_OBJECTS).scene
         self._compared_s = time.monotonic()
-        cost_s = self._compared_s - begun
-        self._compare_pause_s = min(max(_COMPARE_PAUSE_S, cost_s / _COMPARE_SHARE), _COMPARE_PERIOD_S)
+        cost_s = self._compared_s - start_s
+        self._compare_pause_s = min(max(_COMPARE_PAUSE_S, cost_s / _MAX_COMPARE_FRACTION), _COMPARE_PERIOD_S)
         ids = {conversions.collision_object_id(*key): key for key in self._changes.keys}
         in_world = {ids[item.id] for item in scene.world.collision_objects if item.id in ids}
         held = scene.robot_state.attached_collision_objects
         attached = {ids[item.object.id]: item.link_name for item in held if item.object.id in ids}
         for key in self._changes.compare(in_world, attached):
             rospy.logwarn(
-                "planning scene: another node removed '%s', which is in the simulated world; motions are planned "
-                "without it until it moves or is spawned again. Remove all objects to have all of them back",
+                "planning scene: another node removed '%s', which is still in the simulated world; motions are planned "
+                "without this object until it moves or is spawned again. Remove all objects to restore all of them",
                 conversions.collision_object_id(*key),
             )
 
-    def _server_is_there(self) -> bool:
-        """Asks the master twice a second; a server at another address is a new one and has no objects."""
-        now = time.monotonic()
-        if now >= self._next_lookup_s:
-            self._next_lookup_s = now + _PRESENCE_PERIOD_S
+    def _server_available(self) -> bool:
+        """Looks move_group up twice per second; a server at a new address starts without objects."""
+        now_s = time.monotonic()
+        if now_s >= self._next_lookup_s:
+            self._next_lookup_s = now_s + _PRESENCE_PERIOD_S
             master = rosgraph.Master(rospy.get_name())
             try:
                 master.lookupService(ros_names.GET_PLANNING_SCENE)
@@ -188,15 +188,15 @@ class PlanningScenePublisher:
                 uri = ""
             if uri and uri != self._server_uri:
                 self._compared_s = 0.0
-                rospy.loginfo("planning scene: showing the simulated world to move_group at %s", uri)
+                rospy.loginfo("planning scene: sending the simulated world to move_group at %s", uri)
             self._server_uri = uri
         return bool(self._server_uri)
 
     def _fail(self, problem: str) -> float:
-        # At the end of a launch move_group may go before the simulation, so that only a failure that repeats is logged.
-        if problem == self._last_problem and problem != self._told_problem:
-            rospy.logwarn("planning scene: %s; the scene is read and the change sent again", problem)
-            self._told_problem = problem
+        # At the end of a launch, move_group may end before the simulation, so only repeated failures are logged.
+        if problem == self._last_problem and problem != self._logged_problem:
+            rospy.logwarn("planning scene: %s; the scene is read and the change is sent again", problem)
+            self._logged_problem = problem
         self._last_problem = problem
         self._compared_s = 0.0
         return _RETRY_PERIOD_S
@@ -209,7 +209,7 @@ class PlanningScenePublisher:
             try:
                 self._add(scene, change)
             except SimulationError as error:
-                rospy.logerr("planning scene: '%s::%s' cannot be shown: %s", *change.key, error)
+                rospy.logerr("planning scene: '%s::%s' cannot be sent: %s", *change.key, error)
         return scene
 
     def _add(self, scene: PlanningScene, change: Change) -> None:
@@ -225,9 +225,9 @@ class PlanningScenePublisher:
                 world.append(_moved(identity, conversions.pose_to_msg(pose)))
             case Remove():
                 world.append(CollisionObject(id=identity, operation=CollisionObject.REMOVE))
-            case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose, touch_links=touching):
+            case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose, touch_links=touch_links):
                 item = conversions.link_to_collision_object(model, spec, carrier, pose)
-                attached.append(conversions.attached_object(item, carrier, list(touching)))
+                attached.append(conversions.attached_object(item, carrier, list(touch_links)))
             case Detach(carrier_link=carrier):
                 released = AttachedCollisionObject(link_name=carrier)
                 released.object.id = identity

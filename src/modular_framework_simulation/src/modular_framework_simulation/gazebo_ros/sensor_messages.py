@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages of what sensors measure."""
+"""Converts measurements of sensors into messages."""
 
 from __future__ import annotations
 
@@ -13,21 +13,33 @@ from geometry_msgs.msg import Wrench as WrenchMsg
 from sensor_msgs.msg import Imu, LaserScan
 from std_msgs.msg import Header
 
-from modular_framework_simulation.sensors.contact import ContactSensor, Touch, TouchedPair
+from modular_framework_simulation.sensors.contact import ContactPair, ContactSensor, MeasuredContact
 from modular_framework_simulation.sensors.force_torque import ForceTorqueSensor, Wrench
 from modular_framework_simulation.sensors.imu import ImuReading, ImuSensor, Noises
 from modular_framework_simulation.sensors.laser import LaserSensor
 
 
-def wrench_message(sensor: ForceTorqueSensor, wrench: Wrench, head: Header) -> WrenchStamped:
-    """Returns force [N] and torque [Nm]."""
+def wrench_message(sensor: ForceTorqueSensor, wrench: Wrench, message_header: Header) -> WrenchStamped:
+    """Returns the message of a wrench, with force [N] and torque [Nm].
+
+    Args:
+        sensor: Description of the sensor.
+        wrench: The measurement.
+        message_header: Header of the message.
+    """
     del sensor
-    return WrenchStamped(head, WrenchMsg(Vector3(*wrench.force), Vector3(*wrench.torque)))
+    return WrenchStamped(message_header, WrenchMsg(Vector3(*wrench.force), Vector3(*wrench.torque)))
 
 
-def imu_message(sensor: ImuSensor, reading: ImuReading, head: Header) -> Imu:
-    """Returns orientation, angular velocity [rad/s] and specific force [m/s^2] with their variances."""
-    message = Imu(header=head, orientation=Quaternion(*reading.orientation))
+def imu_message(sensor: ImuSensor, reading: ImuReading, message_header: Header) -> Imu:
+    """Returns the message of an IMU reading, with the variances of the noise.
+
+    Args:
+        sensor: Description of the sensor.
+        reading: The measurement.
+        message_header: Header of the message.
+    """
+    message = Imu(header=message_header, orientation=Quaternion(*reading.orientation))
     message.angular_velocity = Vector3(*reading.angular_velocity)
     message.linear_acceleration = Vector3(*reading.specific_force)
     message.orientation_covariance = _diagonal([sensor.orientation_noise.stddev] * 3)
@@ -45,10 +57,16 @@ def _diagonal(deviations: Sequence[float]) -> list[float]:
     return [x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z]
 
 
-def scan_message(sensor: LaserSensor, ranges: npt.NDArray[np.float64], head: Header) -> LaserScan:
-    """Returns a scan, all of it at one instant; intensities are 0, as from shapes without laser_retro."""
+def scan_message(sensor: LaserSensor, ranges: npt.NDArray[np.float64], message_header: Header) -> LaserScan:
+    """Returns the message of a scan; all rays have the same time, and the intensities are 0.
+
+    Args:
+        sensor: Description of the sensor.
+        ranges: Distances along the rays, shape (samples,) [m].
+        message_header: Header of the message.
+    """
     return LaserScan(
-        header=head,
+        header=message_header,
         angle_min=sensor.min_angle,
         angle_max=sensor.max_angle,
         angle_increment=sensor.angle_increment,
@@ -59,22 +77,28 @@ def scan_message(sensor: LaserSensor, ranges: npt.NDArray[np.float64], head: Hea
     )
 
 
-def contacts_message(sensor: ContactSensor, pairs: Sequence[TouchedPair], head: Header) -> ContactsState:
-    """Returns one state a pair of shapes; none while nothing touches."""
+def contacts_message(sensor: ContactSensor, pairs: Sequence[ContactPair], message_header: Header) -> ContactsState:
+    """Returns the message of the contacts, with one state per pair of shapes.
+
+    Args:
+        sensor: Description of the sensor.
+        pairs: The measurement; empty without contacts.
+        message_header: Header of the message.
+    """
     del sensor
     states = []
-    for number, pair in enumerate(pairs, 1):
-        info = f"contact {number} of {len(pairs)}: {pair.own} touches {pair.other} in {len(pair.touches)} points"
+    for index, pair in enumerate(pairs, 1):
+        info = f"contact {index} of {len(pairs)}: {pair.own} touches {pair.other} in {len(pair.contacts)} points"
         state = ContactState(info=info, collision1_name=pair.own, collision2_name=pair.other)
-        state.wrenches = [_wrench([touch]) for touch in pair.touches]
-        state.total_wrench = _wrench(pair.touches)
-        state.contact_positions = [Vector3(*touch.position) for touch in pair.touches]
-        state.contact_normals = [Vector3(*touch.normal) for touch in pair.touches]
-        state.depths = [touch.depth for touch in pair.touches]
+        state.wrenches = [_wrench([contact]) for contact in pair.contacts]
+        state.total_wrench = _wrench(pair.contacts)
+        state.contact_positions = [Vector3(*contact.position) for contact in pair.contacts]
+        state.contact_normals = [Vector3(*contact.normal) for contact in pair.contacts]
+        state.depths = [contact.depth for contact in pair.contacts]
         states.append(state)
-    return ContactsState(header=head, states=states)
+    return ContactsState(header=message_header, states=states)
 
 
-def _wrench(touches: Sequence[Touch]) -> WrenchMsg:
-    forces, torques = zip(*((touch.force, touch.torque) for touch in touches), strict=True)
+def _wrench(contacts: Sequence[MeasuredContact]) -> WrenchMsg:
+    forces, torques = zip(*((contact.force, contact.torque) for contact in contacts), strict=True)
     return WrenchMsg(*(Vector3(*(sum(axis) for axis in zip(*each, strict=True))) for each in (forces, torques)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes what the sensors of all models measure; models and their sensors come and go."""
+"""Publishes the measurements of all models' sensors, and follows added and removed models."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ _QUEUE_SIZE = 50
 
 
 class Instrument(Protocol):
-    """What measures for a sensor."""
+    """Interface of measurements for a sensor."""
 
-    def rest(self) -> None:
-        """Forgets what it would compare the next measurement with."""
+    def reset(self) -> None:
+        """Discards the previous measurement, which the next measurement depends on."""
 
     def measure(self) -> Any:
-        """Returns the measurement of now; None where it has to be called again first."""
+        """Returns the current measurement; None if a further call is required first."""
 
 
 class SensorTopic:
-    """The topic of one sensor; called by the loop's thread.
+    """Publishes the topic of one sensor; called by the loop's thread.
 
     Args:
-        world: Where the sensor is.
-        sensor: The sensor.
-        kind: Type of its messages.
-        instrument: What measures.
-        to_message: Makes the message of a measurement.
+        world: World of the sensor.
+        sensor: Description of the sensor.
+        kind: Message type of the topic.
+        instrument: Measurement of the sensor.
+        to_message: Function that converts the sensor, a measurement and a header into a message.
     """
 
     def __init__(
@@ -63,19 +63,19 @@ class SensorTopic:
         self._world, self._sensor, self._instrument, self._to_message = world, sensor, instrument, to_message
         self._publisher = rospy.Publisher(sensor.topic, kind, queue_size=_QUEUE_SIZE)
         self._period_ns = round(1e9 / sensor.rate_hz) if sensor.rate_hz else 1
-        self._turn, self._revision = 0, -1
+        self._period_index, self._revision = 0, -1
 
     def tick(self) -> None:
-        """Measures and publishes, if it is time to and there is a subscriber."""
+        """Measures and publishes if the period has elapsed and the topic has a subscriber."""
         time_ns = self._world.time_ns
-        turn = time_ns // self._period_ns
-        if turn == self._turn:
+        period_index = time_ns // self._period_ns
+        if period_index == self._period_index:
             return
-        resting = turn < self._turn or self._revision != self._world.revision
-        self._turn, self._revision = turn, self._world.revision
+        reset_needed = period_index < self._period_index or self._revision != self._world.revision
+        self._period_index, self._revision = period_index, self._world.revision
         subscribed = self._publisher.get_num_connections() > 0
-        if resting or not subscribed:
-            self._instrument.rest()
+        if reset_needed or not subscribed:
+            self._instrument.reset()
         if not subscribed:
             return
         measured = self._instrument.measure()
@@ -83,13 +83,13 @@ class SensorTopic:
             self._publisher.publish(self._to_message(self._sensor, measured, header(self._sensor.frame_id, time_ns)))
 
     def close(self) -> None:
-        """Ends the topic."""
+        """Closes the topic."""
         self._publisher.unregister()
 
 
 @dataclass(frozen=True, slots=True)
 class _ModelSensors:
-    """The sensors of one model, and the elements they were read from."""
+    """Topics and cameras of a model, and the elements that describe the sensors."""
 
     elements: object
     topics: tuple[SensorTopic, ...]
@@ -97,16 +97,16 @@ class _ModelSensors:
 
 
 class SensorTopics:
-    """The topics of the sensors of all models but cameras, whose images another process draws.
+    """Publishes the sensors of all models except cameras, which another process renders.
 
-    Publishes: sensor_msgs/Imu, sensor_msgs/LaserScan, gazebo_msgs/ContactsState and geometry_msgs/WrenchStamped, under
+    Publishes: sensor_msgs/Imu, sensor_msgs/LaserScan, gazebo_msgs/ContactsState and geometry_msgs/WrenchStamped, with
     the names in the descriptions.
 
     Args:
-        world: The models.
-        robots: The sensors of robots, which the world has no description of.
-        seed: Of noise.
-        show_cameras: Takes the cameras of all models whenever they change.
+        world: World of the models.
+        robots: Sensors of the robots, whose descriptions the world does not store.
+        seed: Random seed of the noise.
+        show_cameras: Function that is called with the cameras of all models on every change.
     """
 
     def __init__(
@@ -121,39 +121,39 @@ class SensorTopics:
         self._scene = RayScene(world, {name: sensors.parts.links for name, sensors in self._robots.items()})
         self._models: dict[str, _ModelSensors] = {}
         self._topics: tuple[SensorTopic, ...] = ()
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
         self._revision = -1
         self.follow()
 
     def tick(self) -> None:
-        """Publishes what is due; called by the loop's thread after every physics step."""
+        """Publishes due measurements; called by the loop's thread after every physics step."""
         if self._world.revision != self._revision:
             self.follow()
         for topic in self._topics:
             topic.tick()
 
     def follow(self) -> None:
-        """Opens the topics of new models, and closes those of models that are gone."""
+        """Opens the topics of added models, and closes the topics of removed models."""
         self._revision = self._world.revision
-        wanted = {
+        elements_by_model = {
             name: self._robots.get(name) or body.spec.sensors
             for name, body in self._world.bodies.items()
             if name in self._robots or (body.spec is not None and body.spec.sensors)
         }
-        gone = [name for name, model in self._models.items() if wanted.get(name) is not model.elements]
-        new = [name for name in wanted if name not in self._models or name in gone]
-        if not gone and not new:
+        removed = [name for name, model in self._models.items() if elements_by_model.get(name) is not model.elements]
+        added = [name for name in elements_by_model if name not in self._models or name in removed]
+        if not removed and not added:
             return
-        for name in gone:
+        for name in removed:
             for topic in self._models.pop(name).topics:
                 topic.close()
-        for name in new:
-            self._models[name] = self._open(name, wanted[name])
+        for name in added:
+            self._models[name] = self._open(name, elements_by_model[name])
         self._topics = tuple(topic for model in self._models.values() for topic in model.topics)
         self._show_cameras([camera for model in self._models.values() for camera in model.cameras])
 
     def close(self) -> None:
-        """Frees what rays are cast at; may be called twice."""
+        """Closes the copy of the world for rays; may be called twice."""
         self._scene.close()
 
     def _open(self, name: str, elements: Any) -> _ModelSensors:
@@ -163,8 +163,8 @@ class SensorTopics:
             assert spec is not None
             sensors = read_model_sensors(spec, self._seed)
         for kind, fault in sensors.faults.items():
-            if kind not in self._said:
-                self._said.add(kind)
+            if kind not in self._reported:
+                self._reported.add(kind)
                 rospy.logwarn(fault)
         topics, cameras = [], []
         for sensor in sensors.found:
@@ -193,14 +193,14 @@ class SensorTopics:
             case ForceTorqueSensor():
                 load = JointLoad(world, sensor, self._seed)
                 return SensorTopic(world, sensor, WrenchStamped, load, sensor_messages.wrench_message)
-        raise TypeError(f"no topic for {type(sensor).__name__}")
+        raise TypeError(f"{type(sensor).__name__} has no topic")
 
 
 def noise_seed() -> int:
-    """Returns the seed of the noise of sensors: it follows from the parameter /seed, and is random without that.
+    """Returns the seed of the sensor noise, derived from the parameter /seed or random.
 
     Raises:
-        SeedError: The parameter is no seed.
+        SeedError: The parameter is not a valid seed.
     """
     seed = seed_parameter()
     return secrets.randbelow(MAX_SEED) if seed is None else derived_seed(seed, "noise of sensors")

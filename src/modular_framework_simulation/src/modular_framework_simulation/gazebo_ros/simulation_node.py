@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulation as a ROS node: world, robot, controllers and clock in one process."""
+"""ROS node of the simulation, with world, robot, controllers and clock in one process."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ _STATES_RATE_HZ = 50
 _GRASP_RATE_HZ = 50
 _PERFORMANCE_RATE_HZ = 5
 _CAMERA_RATE_HZ = 500
-"""How often is looked whether an image is due."""
+"""Rate of the checks for due images [Hz]."""
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
@@ -65,13 +65,13 @@ _STOP_TIMEOUT_S = 5.0
 
 
 def _pacer(parameters: Mapping[str, Any], requests: RequestQueue) -> Pacer:
-    """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
+    """Returns the pacer; between episodes, an idle limit leaves the CPU to nodes that start or compute."""
     idle_limit = 1.0 if parameters["/wait_for_planning"] else None
     return Pacer(parameters["~real_time_factor"], sleep=requests.serve, idle_limit=idle_limit)
 
 
 def _resources(model_path: str) -> Resources:
-    """Returns where models are looked for: the parameter, Gazebo's environment variables, and exports of packages."""
+    """Returns the search paths of models: the parameter, Gazebo's environment variables, and exports of packages."""
     ros_packages = rospkg.RosPack()
     packages = [Path(ros_packages.get_path(name)) for name in ros_packages.list()]
     first = [Path(entry) for entry in model_path.split(os.pathsep) if entry]
@@ -90,12 +90,12 @@ class SimulationNode:
     controllers, `RosControllerManager`.
 
     Args:
-        parameters: The declared parameters by name.
+        parameters: Declared parameters by name.
 
     Raises:
-        SimulationError: The world or the robot cannot be built.
-        HardwareInterfaceError: A transmission of the robot names an unknown interface.
-        ParameterError: A joint limit parameter has a wrong type.
+        SimulationError: The world or the robot is invalid.
+        HardwareInterfaceError: A transmission of the robot names an unknown hardware interface.
+        ParameterError: A parameter of the joint limits has the wrong type.
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
@@ -121,7 +121,7 @@ class SimulationNode:
         self._visible = VisibleSceneTopics(self._world, lambda: self._loop.paused) if self._topics else None
         self._services = GazeboServices(self._loop, self._resources)
         self._scene = PlanningScenePublisher()
-        self._shown: WorldSnapshot | None = None
+        self._last_snapshot: WorldSnapshot | None = None
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters["~state_digest"] else None
         self._time_services = TimeServices(
             self._loop,
@@ -143,11 +143,11 @@ class SimulationNode:
             file = find_world_file(parameters["~world_file"], (*self._resources.resource_folders, own_worlds))
             spec = read_world(file, self._resources)
             if spec.ignored:
-                rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
+                rospy.logwarn("elements of the world without effect: %s", ", ".join(spec.ignored))
             step_s = self._settings.time_step_s
             if spec.step_s is not None and not math.isclose(spec.step_s, step_s):
                 rospy.logwarn(
-                    "the world asks for steps of %g s; steps of %g s are made (time_step)", spec.step_s, step_s
+                    "the world file sets a step of %g s; the parameter time_step of %g s is used", spec.step_s, step_s
                 )
         engine = parameters["~physics_engine"]
         world = PhysicsWorld(
@@ -160,9 +160,9 @@ class SimulationNode:
             parameters["~weld_grasps"],
         )
         if parameters["~weld_grasps"]:
-            rospy.logwarn("~weld_grasps is true: what a gripper holds is fastened to it, and cannot slip")
+            rospy.logwarn("~weld_grasps is true: held objects are welded to the gripper and cannot slip")
         if parameters["~gui_required"] and not world.engine.has_window:
-            raise SimulationError("~gui_required is true and there is no window; set it to false to run without one")
+            raise SimulationError("~gui_required is true, but no window is available; set ~gui_required to false")
         for model in spec.models:
             world.spawn(model, keep=True)
         names = ", ".join(world.names()) or "none"
@@ -196,8 +196,10 @@ class SimulationNode:
         robots = [read_robot_sensors(description, robot.body.name, find_package, seed)] if robot else []
 
         def make_tracker() -> SceneTracker:
-            seen = {robot.body.name: read_robot_visuals(description, find_package, rospy.logwarn)} if robot else {}
-            return SceneTracker(self._world, seen)
+            robot_visuals = (
+                {robot.body.name: read_robot_visuals(description, find_package, rospy.logwarn)} if robot else {}
+            )
+            return SceneTracker(self._world, robot_visuals)
 
         cameras = CameraProcess(
             make_tracker, configured_cameras(parameters["~sensors"], robot, seed), parameters["~renderer"]
@@ -205,49 +207,49 @@ class SimulationNode:
         return SensorTopics(self._world, robots, seed, cameras.set_cameras), cameras
 
     def _add_hooks(self, clock_rate_hz: float) -> None:
-        def every(rate_hz: float) -> int:
+        def period_ns(rate_hz: float) -> int:
             return round(1e9 / rate_hz) if rate_hz else 0
 
         self._loop.add_hook(
-            Hook(every(clock_rate_hz), self._clock.publish_within_limit if clock_rate_hz else self._clock.publish)
+            Hook(period_ns(clock_rate_hz), self._clock.publish_within_limit if clock_rate_hz else self._clock.publish)
         )
         if self._topics is not None:
-            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
-            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
-            self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
+            self._loop.add_hook(Hook(period_ns(_STATES_RATE_HZ), self._topics.publish_models))
+            self._loop.add_hook(Hook(period_ns(_STATES_RATE_HZ), self._topics.publish_links))
+            self._loop.add_hook(Hook(period_ns(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         if self._visible is not None:
-            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._visible.publish))
-        self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
-        self._loop.add_hook(Hook(every(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
+            self._loop.add_hook(Hook(period_ns(_STATES_RATE_HZ), self._visible.publish))
+        self._loop.add_hook(Hook(period_ns(_GRASP_RATE_HZ), self._watch_grasps))
+        self._loop.add_hook(Hook(period_ns(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
         self._loop.add_hook(Hook(0, self._sensors.tick))
-        self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
-        self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
+        self._loop.add_hook(Hook(period_ns(_SNAPSHOT_RATE_HZ), self._publish_snapshot))
+        self._loop.add_hook(Hook(period_ns(1 / _PACE_REPORT_S), self._report_pace))
 
     def _watch_grasps(self) -> None:
         before = [watch.held for watch in self._loop.grasp_watches]
         self._loop.watch_grasps()
         held = [watch.held for watch in self._loop.grasp_watches]
-        if self._topics is not None:  # also after a reset, which forgets what was held
+        if self._topics is not None:  # also after a reset, which releases the held objects
             self._topics.publish_grasped(sorted({name for name in held if name is not None}))
-        for was, now in zip(before, held, strict=True):
-            if now != was:
-                how = " by a weld" if self._world.weld_grasps else ""
-                rospy.loginfo("the gripper %s", f"holds '{now}'{how}" if now else f"let go of '{was}'")
+        for old, now in zip(before, held, strict=True):
+            if now != old:
+                suffix = " by a weld" if self._world.weld_grasps else ""
+                rospy.loginfo("the gripper %s", f"holds '{now}'{suffix}" if now else f"let go of '{old}'")
         if held != before:
-            self._show_snapshot()
+            self._publish_snapshot()
 
     def _on_paused_tick(self) -> None:
-        """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
+        """Publishes the state while time is paused, because models may be spawned, moved and deleted meanwhile."""
         self._clock.publish()
         self._sensors.follow()
         if self._visible is not None:
             self._visible.publish()
-        self._show_snapshot()
+        self._publish_snapshot()
         self._cameras.tick(self._world.time_ns)
 
-    def _show_snapshot(self) -> None:
-        self._shown = take_snapshot(self._world, self._loop.held_objects(), self._shown)
-        self._scene.show(self._shown)
+    def _publish_snapshot(self) -> None:
+        self._last_snapshot = take_snapshot(self._world, self._loop.held_objects(), self._last_snapshot)
+        self._scene.show(self._last_snapshot)
 
     def _snapshot(self) -> WorldSnapshot:
         return take_snapshot(self._world, self._loop.held_objects())
@@ -256,14 +258,14 @@ class SimulationNode:
         if self._world.time_ns == 0:
             return
         pace = self._loop.pacer.report(self._world.time_ns * 1e-9)
-        text = "real time factor %.3f, %.0f us a step, busy %.0f %% of the time"
-        rospy.loginfo(text, pace.factor, pace.step_cost_s * 1e6, pace.busy_share * 100)
+        text = "real time factor %.3f, %.0f us per step, busy %.0f %% of the time"
+        rospy.loginfo(text, pace.factor, pace.step_cost_s * 1e6, pace.busy_fraction * 100)
 
     def _run_loop(self) -> None:
         try:
             self._loop.run()
             self._report_pace()
-        except Exception as error:  # whatever ends the loop ends the node, and says why
+        except Exception as error:  # any failure of the loop shuts the node down
             rospy.logfatal("the simulation loop ended with %s: %s", type(error).__name__, error)
             self._failed = True
             rospy.signal_shutdown("the simulation loop failed")
@@ -272,11 +274,11 @@ class SimulationNode:
         """Runs until ROS shuts down.
 
         Returns:
-            Exit code of the process: 0 after an ordinary shutdown, 1 when the loop failed.
+            Exit code of the process: 0 after a regular shutdown, 1 if the loop failed.
         """
-        # Threads that serve messages return the interpreter to the loop within this time.
+        # Threads that handle messages return the interpreter lock to the loop within this time.
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
-        # Topics close at a shutdown: the loop has to have ended before.
+        # A shutdown closes the topics, so the loop must end first.
         rospy.on_shutdown(self._stop_loop)
         self._clock.publish()
         self._cameras.connect()
@@ -286,7 +288,7 @@ class SimulationNode:
         if self._topics is not None:
             self._services.connect()
         else:
-            rospy.loginfo("~enable_ros_network is false: no topics and services of Gazebo but /clock")
+            rospy.loginfo("~enable_ros_network is false: except /clock, Gazebo's topics and services are not provided")
         self._time_services.connect()
         self._scene.connect()
         rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
@@ -300,7 +302,7 @@ class SimulationNode:
             self._thread.join(timeout=_STOP_TIMEOUT_S)
 
     def close(self) -> None:
-        """Ends the loop and closes the world; may be called twice."""
+        """Stops the loop and closes the world; may be called twice."""
         self._services.close()
         self._time_services.close()
         self._scene.close()
@@ -318,7 +320,7 @@ def main() -> int:
     """Runs the node.
 
     Returns:
-        Exit code: 0 after an ordinary shutdown, 1 when the world could not be built or the loop failed.
+        Exit code: 0 after a regular shutdown, 1 if the world is invalid or the loop failed.
     """
     init_node()
     widen_backlog()
@@ -327,7 +329,7 @@ def main() -> int:
         if parameters["~verbose"]:
             logging.getLogger("rosout").setLevel(logging.DEBUG)
         if parameters["~unsupported"]:
-            rospy.logwarn("without effect in this simulation: %s", parameters["~unsupported"])
+            rospy.logwarn("arguments without effect in this simulation: %s", parameters["~unsupported"])
         node = SimulationNode(parameters)
     except (SimulationError, HardwareInterfaceError, ParameterError, ValueError) as error:
         rospy.logfatal("the simulation cannot start: %s", error)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tool spawn_model: a client of the simulation's services."""
+"""Tool spawn_model, a client of the simulation's services."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _PACKAGE_SCHEME, _MODEL_SCHEME = "package://", "model://"
 
 
 class SpawnError(Exception):
-    """The model could not be spawned."""
+    """The model was not spawned."""
 
 
 def main() -> int:
     """Runs the tool.
 
     Returns:
-        Exit code: 0 when everything asked for was done, 1 otherwise.
+        Exit code: 0 if all requests succeeded, 1 otherwise.
     """
     command = parse_spawn_command(rospy.myargv()[1:])
     rospy.init_node("spawn_model", anonymous=True)
@@ -49,15 +49,15 @@ def main() -> int:
 
 
 def _delete(command: SpawnCommand) -> None:
-    """Deletes the model, without waiting for a simulation that may have ended before."""
+    """Deletes the model without waiting, because the simulation may have ended."""
     name = ros_names.in_namespace(ros_names.DELETE_MODEL, command.gazebo_namespace)
     try:
-        answer = rospy.ServiceProxy(name, srv.DeleteModel)(command.model)
+        response = rospy.ServiceProxy(name, srv.DeleteModel)(command.model)
     except (rospy.ROSException, rospy.ServiceException, OSError) as error:
         rospy.logerr("spawn_model: '%s' was not deleted: %s", command.model, error)
         return
-    if not answer.success:
-        rospy.logerr("spawn_model: '%s' was not deleted: %s", command.model, answer.status_message)
+    if not response.success:
+        rospy.logerr("spawn_model: '%s' was not deleted: %s", command.model, response.status_message)
 
 
 def _spawn(command: SpawnCommand) -> None:
@@ -68,14 +68,16 @@ def _spawn(command: SpawnCommand) -> None:
         text = package_to_model(text, command.source_name or command.source.value)
     if command.namespace.strip("/"):
         rospy.logwarn(
-            "spawn_model: -robot_namespace %s counts for sensors only: controllers are those of the robot that the "
-            "simulation was started with",
+            "spawn_model: -robot_namespace %s applies to sensors only; the controllers are those of the robot that "
+            "the simulation was started with",
             command.namespace,
         )
     name = ros_names.SPAWN_SDF_MODEL if command.format is Format.SDF else ros_names.SPAWN_URDF_MODEL
     pose = conversions.pose_to_msg(command.pose)
-    answer = _call(command, name, srv.SpawnModel, command.model, text, command.namespace, pose, command.reference_frame)
-    rospy.loginfo("spawn_model: %s", answer.status_message)
+    response = _call(
+        command, name, srv.SpawnModel, command.model, text, command.namespace, pose, command.reference_frame
+    )
+    rospy.loginfo("spawn_model: %s", response.status_message)
     if command.joints:
         joints, values = list(command.joints), list(command.joints.values())
         parameter = command.source_name if command.source is Source.PARAM else ""
@@ -103,7 +105,7 @@ def _description(command: SpawnCommand) -> str:
         case Source.PARAM:
             text = rospy.get_param(command.source_name, None)
             if not isinstance(text, str):
-                raise SpawnError(f"parameter {rospy.resolve_name(command.source_name)} holds no text; upload the model")
+                raise SpawnError(f"parameter {rospy.resolve_name(command.source_name)} is not a text; upload the model")
             return text
 
 
@@ -114,14 +116,14 @@ def _not_empty(text: str, source: str) -> str:
 
 
 def package_to_model(text: str, source: str) -> str:
-    """Returns a description in which meshes of package:// are looked for in the folders of models.
+    """Replaces package:// by model:// in the mesh URIs of a description, so that model folders are searched.
 
     Args:
         text: The description.
-        source: What to call it in messages.
+        source: Name of the description in messages.
 
     Raises:
-        SpawnError: It is not well-formed.
+        SpawnError: The description is not well-formed XML.
     """
     try:
         root = xml_text.parse(text, source)
@@ -164,7 +166,7 @@ def _wait_for_service(name: str) -> None:
 def _call(command: SpawnCommand, service: str, kind: Any, *values: Any) -> Any:
     name = ros_names.in_namespace(service, command.gazebo_namespace)
     _wait_for_service(name)
-    answer = rospy.ServiceProxy(name, kind)(*values)
-    if not getattr(answer, "success", True):
-        raise SpawnError(answer.status_message)
-    return answer
+    response = rospy.ServiceProxy(name, kind)(*values)
+    if not getattr(response, "success", True):
+        raise SpawnError(response.status_message)
+    return response

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the command line of spawn_model, the tool that puts a model into a running simulation."""
+"""Reads the command line of spawn_model, the tool that adds a model to a running simulation."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from modular_framework_simulation.models.poses import Pose
 
 @dataclass(frozen=True, slots=True)
 class SpawnCommand:
-    """The parsed command line of spawn_model.
+    """Parsed command line of spawn_model.
 
     Attributes:
-        model: Instance name.
-        format: Language of the description.
-        source: Where the description comes from.
+        model: Name of the model in the world.
+        format: Format of the description.
+        source: Kind of the description's source.
         source_name: File, parameter or model folder; empty for stdin.
-        pose: Of the model, in the reference frame.
-        reference_frame: Model, "model::link" or empty for the world.
-        namespace: Namespace of the model's ROS interfaces; empty for none given.
+        pose: Pose of the model in the reference frame.
+        reference_frame: Model or "model::link"; empty for the world.
+        namespace: Namespace of the model's ROS interfaces; empty if not given.
         gazebo_namespace: Namespace of the simulation's services.
-        package_to_model: Look for meshes of package:// in the folders of models.
-        joints: Positions to put joints at after the spawn [rad or m].
-        wait_for: Model to wait for first; empty for none.
-        unpause: Let time go on afterwards.
-        bond: Delete the model when the tool ends.
+        package_to_model: Whether meshes with package:// URIs are searched in the model folders.
+        joints: Joint positions after the spawn, by joint name [rad or m].
+        wait_for: Model to wait for before the spawn; empty for none.
+        unpause: Whether time is unpaused after the spawn.
+        bond: Whether the model is deleted when the tool ends.
     """
 
     model: str
@@ -47,14 +47,14 @@ class SpawnCommand:
 
 
 class Format(Enum):
-    """Language of a model description."""
+    """Format of a model description."""
 
     SDF = "sdf"
     URDF = "urdf"
 
 
 class Source(Enum):
-    """Source of a model description."""
+    """Kind of a model description's source."""
 
     FILE = "file"
     PARAM = "param"
@@ -63,12 +63,12 @@ class Source(Enum):
 
 
 def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
-    """Reads the arguments after the program's name.
+    """Parses the arguments after the name of the program.
 
     Raises:
-        SystemExit: They cannot be understood; the reason was printed.
+        SystemExit: The arguments are invalid; the reason has been printed.
     """
-    parser = argparse.ArgumentParser("spawn_model", description="Puts a model into the running simulation.")
+    parser = argparse.ArgumentParser("spawn_model", description="Adds a model to the running simulation.")
     language = parser.add_mutually_exclusive_group(required=True)
     language.add_argument("-sdf", dest="format", action="store_const", const=Format.SDF, help="the model is SDF")
     language.add_argument("-urdf", dest="format", action="store_const", const=Format.URDF, help="the model is URDF")
@@ -81,10 +81,10 @@ def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
     parser.add_argument("-reference_frame", default="", metavar="FRAME", help="model or model::link of the pose")
     parser.add_argument("-robot_namespace", default="", metavar="NS", help="namespace of the model's ROS interfaces")
     parser.add_argument(
-        "-gazebo_namespace", default="/gazebo", metavar="NS", help="of the simulation's services, default /gazebo"
+        "-gazebo_namespace", default="/gazebo", metavar="NS", help="namespace of the services, default /gazebo"
     )
     parser.add_argument(
-        "-package_to_model", action="store_true", help="look for meshes of package:// in the folders of models"
+        "-package_to_model", action="store_true", help="search meshes with package:// URIs in the model folders"
     )
     for name in ("x", "y", "z"):
         parser.add_argument(f"-{name}", type=float, default=0.0, help="position [m], default 0")
@@ -92,7 +92,7 @@ def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
         parser.add_argument(f"-{name}", type=float, default=0.0, help=f"{meaning} [rad], default 0")
     parser.add_argument("-J", nargs=2, action="append", default=[], metavar=("JOINT", "VALUE"), help="joint position")
     parser.add_argument("-wait", default="", metavar="MODEL", help="wait for this model first")
-    parser.add_argument("-unpause", action="store_true", help="let time go on afterwards")
+    parser.add_argument("-unpause", action="store_true", help="unpause time after the spawn")
     parser.add_argument("-b", "-bond", dest="bond", action="store_true", help="delete the model when this program ends")
     options = parser.parse_args(arguments)
     joints: dict[str, float] = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the joint positions a simulated robot starts with, written the way spawn_model takes them."""
+"""Reads the initial joint positions of a simulated robot, in the syntax of spawn_model."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from modular_framework_simulation.errors import DescriptionError
 
 
 def parse_starting_pose(text: str) -> dict[str, float]:
-    """Reads "-J joint value -J joint value ...".
+    """Parses "-J joint value -J joint value ...".
 
     Args:
-        text: The words; empty for no positions at all.
+        text: Arguments; empty for no positions.
 
     Returns:
-        Position of each named joint [rad or m].
+        Positions by joint name [rad or m].
 
     Raises:
-        DescriptionError: The words do not come in threes of -J, name and finite number, or a joint comes twice.
+        DescriptionError: The arguments are not groups of -J, joint and finite number, or a joint occurs twice.
     """
     words = text.split()
     positions: dict[str, float] = {}
@@ -26,7 +26,7 @@ def parse_starting_pose(text: str) -> dict[str, float]:
         triple = words[start : start + 3]
         where = f"starting pose, word {start + 1}"
         if len(triple) != 3 or triple[0] != "-J":
-            raise DescriptionError(where, f"got '{' '.join(triple)}'", "expected '-J <joint> <value>' again and again")
+            raise DescriptionError(where, f"got '{' '.join(triple)}'", "expected '-J <joint> <value>', repeated")
         try:
             value = float(triple[2])
         except ValueError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services with which nodes hold simulated time, let it pass, begin the world again, and judge what became of it."""
+"""Services that hold and advance simulated time, restart the world, and return the referee's records."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from modular_framework_simulation.loop.snapshots import WorldSnapshot
 from modular_framework_simulation.loop.time_holds import Advance, HoldError
 from modular_framework_simulation.loop.world_digest import WorldDigest
 
-_ANSWER_TIMEOUT_S = 30.0
+_RESPONSE_TIMEOUT_S = 30.0
 _WAIT_SLICE_S = 0.2
-_LONGEST_ADVANCE_S = 3600.0
-_LONGEST_STEP_S = 1.0
-"""Steps are made one after the other, while no other request is carried out."""
+_MAX_ADVANCE_S = 3600.0
+_MAX_STEP_S = 1.0
+"""Maximum duration of one request, because the steps run without serving other requests."""
 _MIN_REAL_TIME_FACTOR = 0.02
-"""Simulated over real time below which a request for time to pass is given up."""
+"""Minimum ratio of simulated to real time; a slower request to advance time is cancelled."""
 
 
 class TimeServices:
-    """Advertises and answers /gazebo/{hold,advance,step}_time, /gazebo/{restart,referee,state_digest}.
+    """Serves /gazebo/{hold,advance,step}_time and /gazebo/{restart,referee,state_digest}.
 
     Args:
         loop: The simulation loop.
-        scene: Is brought in step with the world before an answer is given.
-        take_snapshot: Copies the state of the world; called by the loop's thread.
-        may_hold: Whether time may be held: the parameter /wait_for_planning.
-        digest: Hashes every step; None where nobody asks for that.
-        after_restart: Called, beside the loop, once the world has begun again.
+        scene: Planning scene, which is synchronized before a response.
+        take_snapshot: Function that copies the state of the world; called by the loop's thread.
+        may_hold: Value of the parameter /wait_for_planning: whether nodes may hold time.
+        digest: Hash of every step; None if not requested.
+        after_restart: Function that is called outside the loop after a restart of the world.
     """
 
     def __init__(
@@ -61,14 +61,14 @@ class TimeServices:
 
     def connect(self) -> None:
         """Advertises the services."""
-        for name, kind, answer in (
+        for name, kind, response in (
             (ros_names.HOLD_TIME, HoldTime, self._on_hold),
             (ros_names.ADVANCE_TIME, AdvanceTime, self._on_advance),
             (ros_names.STEP_TIME, AdvanceTime, self._on_step),
             (ros_names.RESTART, Trigger, self._on_restart),
             (ros_names.REFEREE, Trigger, self._on_referee),
         ):
-            self._services.append(rospy.Service(name, kind, answer))
+            self._services.append(rospy.Service(name, kind, response))
         if self._digest is not None:
             self._services.append(rospy.Service(ros_names.STATE_DIGEST, Trigger, self._on_digest))
 
@@ -78,7 +78,7 @@ class TimeServices:
             self._services.pop().shutdown("the simulation ends")
 
     def _in_loop(self, what: str, work: Callable[[], Any]) -> Any:
-        return self._loop.requests.call(what, work, _ANSWER_TIMEOUT_S)
+        return self._loop.requests.call(what, work, _RESPONSE_TIMEOUT_S)
 
     def _on_hold(self, request: Any) -> HoldTimeResponse:
         holds = self._loop.holds
@@ -92,7 +92,7 @@ class TimeServices:
 
         try:
             if not self._may_hold:
-                raise HoldError("the simulation was started without /wait_for_planning: time passes all the time")
+                raise HoldError("simulated time cannot be held, because /wait_for_planning is false")
             return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, work))
         except (HoldError, SimulationError) as error:
             rospy.logerr("%s: %s", ros_names.HOLD_TIME, error)
@@ -101,22 +101,22 @@ class TimeServices:
     def _on_advance(self, request: Any) -> AdvanceTimeResponse:
         try:
             duration_s = request.duration.to_sec()
-            if not 0.0 <= duration_s <= _LONGEST_ADVANCE_S:
-                raise HoldError(f"duration is {duration_s:g} s; allowed is 0 to {_LONGEST_ADVANCE_S:g} s")
+            if not 0.0 <= duration_s <= _MAX_ADVANCE_S:
+                raise HoldError(f"duration is {duration_s:g} s; allowed: 0 to {_MAX_ADVANCE_S:g} s")
             if duration_s > 0.0:
-                self._let_pass(duration_s)
-            stamp, held = self._catch_up()
+                self._advance(duration_s)
+            stamp, held = self._synchronized_now()
             return AdvanceTimeResponse(success=True, stamp=stamp, held=held)
         except (HoldError, SimulationError) as error:
             rospy.logerr("%s: %s", ros_names.ADVANCE_TIME, error)
             return AdvanceTimeResponse(success=False, message=str(error))
 
     def _on_step(self, request: Any) -> AdvanceTimeResponse:
-        """Lets paused time pass by a duration, in whole physics steps and at least one of them."""
+        """Advances paused time by a duration, rounded up to at least one physics step."""
         try:
             duration_s = request.duration.to_sec()
-            if not 0.0 <= duration_s <= _LONGEST_STEP_S:
-                raise HoldError(f"duration is {duration_s:g} s; allowed is 0 (one step) to {_LONGEST_STEP_S:g} s")
+            if not 0.0 <= duration_s <= _MAX_STEP_S:
+                raise HoldError(f"duration is {duration_s:g} s; allowed: 0 (one step) to {_MAX_STEP_S:g} s")
             stamp = self._in_loop(ros_names.STEP_TIME, lambda: self._step(duration_s))
             return AdvanceTimeResponse(success=True, stamp=stamp, held=True)
         except (HoldError, SimulationError) as error:
@@ -133,20 +133,20 @@ class TimeServices:
     def _whole_steps(self, duration_s: float) -> int:
         return max(1, math.ceil(duration_s / self._loop.world.settings.time_step_s - 1e-6))
 
-    def _let_pass(self, duration_s: float) -> None:
-        """Waits until a duration has passed, in whole physics steps, or the world has begun again."""
+    def _advance(self, duration_s: float) -> None:
+        """Waits until time has advanced by a duration, rounded up to physics steps, or the world has restarted."""
         holds, count = self._loop.holds, self._whole_steps(duration_s)
-        asked: Advance = self._in_loop(ros_names.ADVANCE_TIME, lambda: holds.advance(self._loop.world.steps + count))
-        waited_s, limit_s = 0.0, _ANSWER_TIMEOUT_S + duration_s / _MIN_REAL_TIME_FACTOR
-        while not asked.passed.wait(_WAIT_SLICE_S):
+        request: Advance = self._in_loop(ros_names.ADVANCE_TIME, lambda: holds.advance(self._loop.world.steps + count))
+        waited_s, limit_s = 0.0, _RESPONSE_TIMEOUT_S + duration_s / _MIN_REAL_TIME_FACTOR
+        while not request.passed.wait(_WAIT_SLICE_S):
             waited_s += _WAIT_SLICE_S
             if waited_s > limit_s or rospy.is_shutdown():
-                self._loop.requests.post(lambda: holds.give_up(asked))
+                self._loop.requests.post(lambda: holds.give_up(request))
                 state = "paused" if self._loop.paused else f"held by {', '.join(holds.owners) or 'nobody'}"
                 raise HoldError(f"{duration_s:g} s did not pass within {waited_s:.0f} s of real time; time is {state}")
 
-    def _catch_up(self) -> tuple[rospy.Time, bool]:
-        """Returns the time of now, and whether it is held; if so, once the planning scene is that of now."""
+    def _synchronized_now(self) -> tuple[rospy.Time, bool]:
+        """Returns the current time and whether it is held; if so, the planning scene is synchronized first."""
         stamp, held, snapshot = self._in_loop(ros_names.ADVANCE_TIME, self._now)
         if snapshot is not None:
             self._scene.bring_up_to_date(snapshot)
@@ -154,8 +154,8 @@ class TimeServices:
 
     def _now(self) -> tuple[rospy.Time, bool, WorldSnapshot | None]:
         held, world = self._loop.held, self._loop.world
-        is_news = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
-        return stamp_of(self._loop.world), held, self._take_snapshot() if is_news else None
+        outdated = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
+        return stamp_of(self._loop.world), held, self._take_snapshot() if outdated else None
 
     def _on_restart(self, request: Any) -> TriggerResponse:
         try:
@@ -165,13 +165,13 @@ class TimeServices:
         except SimulationError as error:
             rospy.logerr("%s: %s", ros_names.RESTART, error)
             return TriggerResponse(success=False, message=str(error))
-        return TriggerResponse(success=True, message="the world is as at the start")
+        return TriggerResponse(success=True, message="the world is in its initial state")
 
     def _on_referee(self, _request: Any) -> TriggerResponse:
-        """Answers with the held objects, the poses of all models (xyz [m], xyzw) and the interventions, as JSON."""
+        """Returns the held objects, the poses of all models (x, y, z [m], xyzw) and the interventions as JSON."""
         world = self._loop.world
 
-        def look() -> dict[str, Any]:
+        def read() -> dict[str, Any]:
             poses = {name: world.body(name).state().pose for name in world.names()}
             return {
                 "held": sorted({held.model for held in self._loop.held_objects()}),
@@ -180,7 +180,7 @@ class TimeServices:
             }
 
         try:
-            return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, look)))
+            return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, read)))
         except SimulationError as error:
             return TriggerResponse(success=False, message=str(error))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes what can be seen of the world, for viewers in other processes."""
+"""Publishes the visible scene for viewers in other processes."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from modular_framework_simulation.sensors.scene_text import (
 )
 from modular_framework_simulation.sensors.visible_scene import SceneTracker
 
-_SHORTEST_PERIOD_S = 0.03
-"""Real time between two messages, however fast simulated time runs [s]."""
+_MIN_PERIOD_S = 0.03
+"""Minimum period of messages in real time, independent of the pace of simulated time [s]."""
 
 
 class VisibleSceneTopics:
-    """What models look like and where they are; all methods are called by the loop's thread.
+    """Publishes visual shapes and link poses; all methods are called by the loop's thread.
 
-    Robots are left out: their description and joint states are public.
+    Robots are left out, because their descriptions and joint states are published anyway.
 
-    Publishes: /gazebo/visible_models (std_msgs/String, latched): JSON of `models_to_text`, when models come or go;
-    /gazebo/visible_poses (std_msgs/String): JSON of `poses_to_text`, about 25 times a second of real time. Both only
-    while somebody subscribes to the poses.
+    Publishes: /gazebo/visible_models (std_msgs/String, latched): JSON of `models_to_text`, when a model is added or
+    removed; /gazebo/visible_poses (std_msgs/String): JSON of `poses_to_text`, about 25 times per second of real time.
+    Both topics are only published while the poses have a subscriber.
 
     Args:
-        world: What is seen.
-        is_paused: Whether time is paused.
-        clock: Real time [s].
+        world: World of the models.
+        is_paused: Function that returns whether time is paused.
+        clock: Function that returns real time [s].
     """
 
     def __init__(
@@ -52,11 +52,11 @@ class VisibleSceneTopics:
         self._poses: dict[int, LinkPoses] = {}
 
     def publish(self) -> None:
-        """Publishes what is new, if it is time for that and there is a subscriber."""
+        """Publishes all changes if the period has elapsed and the poses have a subscriber."""
         now_s = self._clock()
         if now_s < self._due_s:
             return
-        self._due_s = now_s + _SHORTEST_PERIOD_S
+        self._due_s = now_s + _MIN_PERIOD_S
         if not self._links.get_num_connections():
             self._tracker = None
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds a world file by the name that a launch file gives it."""
+"""Finds a world file by its name in a launch file."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from modular_framework_simulation.models.sdf_resources import RESOURCE_PATH
 
 
 def find_world_file(name: str, folders: Sequence[Path]) -> Path:
-    """Returns the file: a path, or a path below one of the folders of resources.
+    """Returns the path of a world file, which may be relative to a resource folder.
 
     Args:
-        name: As given, for example "worlds/empty.world".
-        folders: Those of GAZEBO_RESOURCE_PATH, and that of the worlds which come with this package.
+        name: Path in the launch file, for example "worlds/empty.world".
+        folders: Folders in GAZEBO_RESOURCE_PATH, and the world folder of this package.
 
     Raises:
-        DescriptionError: There is none.
+        DescriptionError: The file does not exist.
     """
     candidates = [Path(name), *(folder / name for folder in folders)]
     for candidate in candidates:
@@ -26,4 +26,4 @@ def find_world_file(name: str, folders: Sequence[Path]) -> Path:
             return candidate
     looked_for = ", ".join(str(each) for each in candidates)
     advice = f"looked for {looked_for}; set {RESOURCE_PATH}"
-    raise DescriptionError(name, "cannot be read: there is no such file", advice)
+    raise DescriptionError(name, "cannot be read: the file does not exist", advice)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the clock, how fast it runs, the states of models and links, and the objects that grippers hold."""
+"""Publishes the clock and its rate, the states of models and links, and the names of held objects."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState
 
 _QUEUE_SIZE = 50
-"""Messages that wait for a subscriber: time that runs faster than real time sends them in bursts."""
+"""Queue size; if simulated time is faster than real time, messages are sent in bursts."""
 _CLOCK_LIMIT_HZ = 250.0
-"""Most messages of /clock in a second of real time: each one wakes every node, which at 10 times real time took more
-than a processor."""
+"""Maximum rate of /clock in real time [Hz]; every message wakes all nodes, which at 10 times real time took more than
+one CPU core."""
 _CLOCK_BURST = 5.0
-"""Messages of /clock that may follow each other at once: the loop makes steps in groups, and catches up."""
+"""Maximum number of consecutive /clock messages without a pause; the loop runs steps in groups and catches up."""
 
 
 def stamp_of(world: PhysicsWorld) -> rospy.Time:
-    """Returns simulated time."""
+    """Returns the simulated time."""
     return rospy.Time(*divmod(world.time_ns, 1_000_000_000))
 
 
 def init_node() -> None:
-    """Makes this process the simulation's node, which sets its own time and does not subscribe to /clock."""
+    """Initializes the node of the simulation, which sets its own time instead of subscribing to /clock."""
     rospy.init_node(ros_names.NODE, disable_rostime=True)
     if rospy.get_param("/use_sim_time", False):
         rospy.rostime._set_rostime(rospy.Time())
@@ -42,41 +42,41 @@ class ClockTopic:
     """Publishes /clock (rosgraph_msgs/Clock) and sets rospy's time in this node; used by the loop's thread.
 
     Args:
-        world: Whose time is published.
+        world: World whose time is published.
     """
 
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
         self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
         self._credit = _CLOCK_BURST
-        self._credited_s = time.monotonic()
+        self._credit_time_s = time.monotonic()
 
     def publish(self) -> None:
-        """Publishes simulated time."""
+        """Publishes the simulated time."""
         stamp = stamp_of(self._world)
         if not rospy.rostime.is_wallclock():
             rospy.rostime._set_rostime(stamp)
         self._clock.publish(Clock(stamp))
 
     def publish_within_limit(self) -> None:
-        """Publishes simulated time, at most 250 times in a second of real time."""
+        """Publishes the simulated time, at most 250 times per second of real time."""
         now_s = time.monotonic()
-        self._credit = min(self._credit + (now_s - self._credited_s) * _CLOCK_LIMIT_HZ, _CLOCK_BURST)
-        self._credited_s = now_s
+        self._credit = min(self._credit + (now_s - self._credit_time_s) * _CLOCK_LIMIT_HZ, _CLOCK_BURST)
+        self._credit_time_s = now_s
         if self._credit >= 1.0:
             self._credit -= 1.0
             self.publish()
 
 
 class WorldTopics:
-    """Publishers of the simulation; all methods are called by the loop's thread.
+    """Publishes the state of the world; all methods are called by the loop's thread.
 
     Publishes: /gazebo/model_states, /gazebo/link_states, /gazebo/performance_metrics (gazebo_msgs/PerformanceMetrics,
-    without sensors), and /gazebo/grasped_object (std_msgs/String, latched; empty while nothing is held; names of
-    several objects are separated by commas).
+    without sensors), and /gazebo/grasped_object (std_msgs/String, latched; names of held objects separated by commas,
+    or empty).
 
     Args:
-        world: What is published.
+        world: World of the models.
     """
 
     def __init__(self, world: PhysicsWorld) -> None:
@@ -85,7 +85,7 @@ class WorldTopics:
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
         self._performance = rospy.Publisher(ros_names.PERFORMANCE_METRICS, PerformanceMetrics, queue_size=10)
-        self._measured_at = (time.monotonic(), world.time_ns)
+        self._last_measurement = (time.monotonic(), world.time_ns)
         self._last_grasped: str | None = None
         self.publish_grasped(())
 
@@ -93,7 +93,7 @@ class WorldTopics:
         """Publishes the states of all models, if there is a subscriber."""
         if self._models.get_num_connections():
             states = [(name, self._world.body(name).state()) for name in self._world.names()]
-            self._models.publish(_filled(ModelStates(), states))
+            self._models.publish(_with_states(ModelStates(), states))
 
     def publish_links(self) -> None:
         """Publishes the states of all links, if there is a subscriber."""
@@ -101,27 +101,27 @@ class WorldTopics:
             bodies = [(name, self._world.body(name)) for name in self._world.names()]
             links = [(name, body, link) for name, body in bodies for link in body.link_names()]
             states = [(f"{name}{SCOPE}{link}", body.link_state(link)) for name, body, link in links]
-            self._links.publish(_filled(LinkStates(), states))
+            self._links.publish(_with_states(LinkStates(), states))
 
     def publish_performance(self) -> None:
-        """Publishes simulated over real time since the last call; nothing after a reset of time."""
+        """Publishes the real-time factor since the last call; publishes nothing after a reset of time."""
         real_s, simulated_ns = time.monotonic(), self._world.time_ns
-        before_s, before_ns = self._measured_at
-        self._measured_at = (real_s, simulated_ns)
+        before_s, before_ns = self._last_measurement
+        self._last_measurement = (real_s, simulated_ns)
         if self._performance.get_num_connections() and simulated_ns > before_ns:
             message = PerformanceMetrics(real_time_factor=(simulated_ns - before_ns) * 1e-9 / (real_s - before_s))
             message.header.stamp = stamp_of(self._world)
             self._performance.publish(message)
 
     def publish_grasped(self, names: Sequence[str]) -> None:
-        """Publishes the names of the held objects when they changed."""
+        """Publishes the names of the held objects if they have changed."""
         text = ",".join(names)
         if text != self._last_grasped:
             self._last_grasped = text
             self._grasped.publish(String(text))
 
 
-def _filled(message: Any, states: list[tuple[str, BodyState]]) -> Any:
+def _with_states(message: Any, states: list[tuple[str, BodyState]]) -> Any:
     message.name = [name for name, _ in states]
     message.pose = [conversions.pose_to_msg(state.pose) for _, state in states]
     message.twist = [conversions.twist_to_msg(state.twist) for _, state in states]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulation loop, which advances controllers, physics and time, and serves requests between the steps."""
+"""Simulation loop, which advances controllers, physics and time, and executes requests between the steps."""

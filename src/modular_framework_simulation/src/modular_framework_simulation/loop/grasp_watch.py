@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides from contacts which object a gripper holds.
+"""Detects from contacts which object a gripper holds.
 
-An object counts as held once it has touched two fingers for a while, and as let go once it has lost one of them for a
-while: single contacts come and go while an object settles between the pads.
+A gripper holds an object after the object has touched two fingers for some time, and releases it after the object has
+lost contact with a finger for some time. Single contacts are ignored, because they change while an object settles
+between the pads.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ from collections.abc import Collection, Sequence
 
 
 class GraspWatch:
-    """Follows the contacts of the fingers of one gripper.
+    """Tracks the contacts of a gripper's fingers.
 
     Args:
-        hold_after_s: How long both fingers must touch an object until it is held [s of simulated time].
-        release_after_s: How long one of them must miss it until it is let go [s].
+        hold_after_s: Contact time of two fingers after which an object is held [s of simulated time].
+        release_after_s: Time without contact of two fingers after which the object is released [s of simulated time].
     """
 
     def __init__(self, hold_after_s: float = 0.2, release_after_s: float = 0.3) -> None:
@@ -26,20 +27,20 @@ class GraspWatch:
         self.held: str | None = None
 
     def reset(self) -> None:
-        """Clears all contacts."""
+        """Discards all contacts."""
         self._touched_since.clear()
         self._missed_since = None
         self.held = None
 
     def update(self, time_s: float, touched_by_finger: Sequence[Collection[str]]) -> str | None:
-        """Updates which object is held.
+        """Updates the held object.
 
         Args:
             time_s: Simulated time [s].
-            touched_by_finger: For each finger the movable objects it touches.
+            touched_by_finger: Names of the movable objects in contact, per finger.
 
         Returns:
-            The name of the object that is held, None if there is none.
+            Name of the held object; None if the gripper holds no object.
         """
         counts: dict[str, int] = {}
         for touched in touched_by_finger:

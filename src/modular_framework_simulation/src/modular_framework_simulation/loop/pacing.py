@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps simulated time in step with real time, and measures how well that works."""
+"""Synchronizes simulated time with real time, and measures the pace."""
 
 from __future__ import annotations
 
@@ -8,46 +8,46 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-_LARGEST_DEBT_S = 1.0
-"""Longest lag that is caught up [s]; after a longer stall (a suspended machine) the rest is dropped."""
+_MAX_LAG_S = 1.0
+"""Maximum lag that is caught up [s]; after a longer stall, such as a suspended machine, the excess is dropped."""
 
-_LEAD_S, _CALM_LEAD_S = 0.008, 0.018
-"""How far simulated time runs ahead before the loop sleeps, and how far while the robot stands still [s]: steps that
-follow each other find their data in the processor's caches, so that five steps of 2 ms and one sleep cost less than
-five of each."""
+_LEAD_S, _REST_LEAD_S = 0.008, 0.018
+"""Lead of simulated time over real time before the loop sleeps, in general and while the robot is at rest [s].
+Consecutive steps find their data in the CPU caches, so five steps of 2 ms and one sleep cost less than five steps with
+five sleeps."""
 
-_STILL_FACTOR = 4.0
-"""Factor of "as fast as possible" while the robot stands still and nothing is commanded: then nodes compute, and every
-message of the simulation takes processor time from them. The shipped pick takes 24 s of processor time with 4, 32 s
-with 10, 56 s without a bound."""
+_REST_FACTOR = 4.0
+"""Real-time factor of "as fast as possible" while the robot is at rest without a command. Nodes compute during this
+time, and every message of the simulation costs them CPU time. The shipped pick takes 24 s of CPU time with factor 4,
+32 s with factor 10, and 56 s without a limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaceReport:
-    """Figures of the simulation since the last report.
+    """Pace of the simulation since the last report.
 
     Attributes:
-        factor: Simulated time over real time.
-        busy_share: Share of the real time that the loop did not sleep.
-        step_cost_s: Mean real time a step took, sleep left out [s].
+        factor: Ratio of simulated time to real time.
+        busy_fraction: Fraction of real time in which the loop did not sleep.
+        step_cost_s: Mean real time of a step without sleep [s].
     """
 
     factor: float
-    busy_share: float
+    busy_fraction: float
     step_cost_s: float
 
 
 class Pacer:
-    """Sleeps as long as simulated time is ahead of real time.
+    """Sleeps while simulated time is ahead of real time.
 
-    Simulated time is at most 8 ms ahead, 18 ms while the robot stands still. A loop that fell behind runs without sleep
-    until it has caught up, so that the average keeps the requested factor.
+    Simulated time is at most 8 ms ahead, or 18 ms while the robot is at rest. After a delay, the loop runs without
+    sleep until it has caught up, so that the average pace equals the requested factor.
 
     Args:
-        real_time_factor: Simulated over real time; 0 is as fast as possible.
-        clock: Real time [s].
-        sleep: Waits [s].
-        idle_limit: Largest factor while nobody waits for simulated time; None: any.
+        real_time_factor: Ratio of simulated to real time; 0 for as fast as possible.
+        clock: Function that returns real time [s].
+        sleep: Function that waits for a time [s].
+        idle_limit: Maximum factor while no node waits for simulated time; None for no limit.
     """
 
     def __init__(
@@ -72,13 +72,13 @@ class Pacer:
         self.start(0.0)
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Keeps another factor from now on.
+        """Sets the real-time factor.
 
         Args:
-            real_time_factor: Simulated over real time; 0 is as fast as possible.
+            real_time_factor: Ratio of simulated to real time; 0 for as fast as possible.
 
         Raises:
-            ValueError: It is negative or not finite.
+            ValueError: The factor is negative or not finite.
         """
         if not 0 <= real_time_factor < math.inf:
             raise ValueError(f"real_time_factor is {real_time_factor:g}; allowed: 0 (as fast as possible) or greater")
@@ -87,14 +87,14 @@ class Pacer:
         self._idle_factor = real_time_factor if limit is None else min(real_time_factor or limit, limit)
 
     def reset_factor(self) -> None:
-        """Keeps the factor of the beginning again."""
+        """Restores the initial real-time factor."""
         self.set_factor(self._initial_factor)
 
     def start(self, simulated_s: float) -> None:
-        """Restarts, after a pause or a reset of time.
+        """Restarts the pacing after a pause or a reset of time.
 
         Args:
-            simulated_s: Present simulated time [s].
+            simulated_s: Current simulated time [s].
         """
         now = self._clock()
         self._start_real_s = self._report_real_s = now
@@ -103,17 +103,17 @@ class Pacer:
         self._steps = 0
 
     def keep(self, simulated_s: float, idle: bool = False, calm: bool = False, still: bool = False) -> None:
-        """Waits until real time has come as far as simulated time [s].
+        """Waits until real time has caught up with simulated time.
 
         Args:
-            simulated_s: Present simulated time [s].
-            idle: Whether nobody waits for it.
-            calm: Whether the robot stands still and nothing is commanded, or there is none.
-            still: Whether there is a robot that stands still, nothing is commanded, and nobody holds time.
+            simulated_s: Current simulated time [s].
+            idle: Whether no node waits for simulated time.
+            calm: Whether the world has no robot, or the robot is at rest without a command.
+            still: Whether the world has a robot that is at rest without a command, and no node holds time.
         """
         factor = self._idle_factor if idle else self.real_time_factor
         if factor == 0.0 and still:
-            factor = _STILL_FACTOR
+            factor = _REST_FACTOR
         if self._factor != factor:
             self._factor = factor
             self.start(simulated_s)
@@ -123,14 +123,14 @@ class Pacer:
         due = self._start_real_s + (simulated_s - self._start_simulated_s) / self._factor
         now = self._clock()
         ahead = due - now
-        if ahead > (_CALM_LEAD_S if calm else _LEAD_S):
+        if ahead > (_REST_LEAD_S if calm else _LEAD_S):
             self._sleep(ahead)
             self._slept_s += self._clock() - now
-        elif ahead < -_LARGEST_DEBT_S:
-            self._start_real_s -= ahead + _LARGEST_DEBT_S
+        elif ahead < -_MAX_LAG_S:
+            self._start_real_s -= ahead + _MAX_LAG_S
 
     def report(self, simulated_s: float) -> PaceReport:
-        """Returns the figures since the last report, and resets them."""
+        """Returns the pace since the last report, and resets the measurement."""
         now = self._clock()
         real = max(now - self._report_real_s, 1e-9)
         busy = max(real - self._slept_s, 0.0)

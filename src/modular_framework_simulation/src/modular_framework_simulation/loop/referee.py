@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps what an episode is judged by: the requests that changed the world, and motions that no physics explains.
+"""Records evidence against an episode: requests that changed the world, and motions that physics does not explain.
 
-It reads the world in the simulation's own process, so no other node can write what it says.
+The referee reads the world in the simulation's process, so no other node can change its records.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from modular_framework_simulation.physics.physics_engine import REST_LOOK_S
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_urdf.rotations import Vector3
 
-JUMP_M = 0.01
-"""Distance between two looks that contacts may add to what the velocity explains [m]."""
-KEPT_INTERVENTIONS = 100
+MAX_UNEXPLAINED_M = 0.01
+"""Maximum displacement between two checks beyond the displacement that the velocity explains [m], due to contacts."""
+MAX_INTERVENTIONS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Intervention:
-    """A change of the world that is not due to its physics.
+    """A change of the world that is not caused by its physics.
 
     Attributes:
-        number: Counts all interventions since the simulation started, from 1.
+        number: Index of the intervention since the start of the simulation, from 1.
         time_s: Simulated time [s].
-        what: Service or topic that changed the world, or the motion that no velocity explains.
-        caller: Name that the calling node gave; "" where none is known.
+        what: Service or topic that changed the world, or a description of the unexplained motion.
+        caller: Name of the calling node; "" if unknown.
     """
 
     number: int
@@ -40,7 +40,7 @@ class Intervention:
 
 @dataclass(frozen=True, slots=True)
 class _Motion:
-    """Centre of mass [m] and speed [m/s] of a model, and when it had them [ns]."""
+    """Centre of mass [m] and speed [m/s] of a model at a simulated time [ns]."""
 
     centre: Vector3
     speed: float
@@ -48,36 +48,36 @@ class _Motion:
 
 
 class Referee:
-    """Notes interventions.
+    """Records interventions.
 
     Args:
-        world: Read by the loop's thread only.
+        world: The world, read by the loop's thread only.
     """
 
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
         self._lock = threading.Lock()
-        self._interventions: deque[Intervention] = deque(maxlen=KEPT_INTERVENTIONS)
+        self._interventions: deque[Intervention] = deque(maxlen=MAX_INTERVENTIONS)
         self._count = 0
         self._seen: dict[str, _Motion] = {}
         self._seen_ns = self._seen_revision = -1
 
     @property
     def interventions(self) -> tuple[Intervention, ...]:
-        """The latest interventions, at most KEPT_INTERVENTIONS."""
+        """Returns the latest interventions, at most KEPT_INTERVENTIONS."""
         with self._lock:
             return tuple(self._interventions)
 
     def note(self, what: str, caller: str) -> None:
-        """Notes an intervention; any thread may do it."""
+        """Records an intervention; may be called from any thread."""
         with self._lock:
             self._count += 1
             self._interventions.append(Intervention(self._count, self._world.time_ns * 1e-9, what, caller))
 
     def look(self) -> None:
-        """Notes models that moved farther since the last look than their velocity allows; a hook.
+        """Records models that moved farther since the last check than their velocity allows; used as a hook.
 
-        After a request that moved models, which is noted by its service, the look begins again.
+        Requests that move models are recorded by their services; after such a request, the check restarts.
         """
         world, passed_s = self._world, (self._world.time_ns - self._seen_ns) * 1e-9
         same_world = world.revision == self._seen_revision and passed_s > 0.0
@@ -91,11 +91,11 @@ class Referee:
         self._seen |= moving
 
     def _judge(self, name: str, before: _Motion, now: _Motion, passed_s: float) -> None:
-        """Notes a jump; a model that was at rest moves for at most REST_LOOK_S before the world says so."""
+        """Records a jump; the world reports the motion of a sleeping model with a delay of at most REST_LOOK_S."""
         passed_s = min((now.time_ns - before.time_ns) * 1e-9, passed_s + REST_LOOK_S)
         fall = math.hypot(*self._world.gravity) * passed_s
         moved_m = math.dist(now.centre, before.centre)
-        if moved_m > (max(now.speed, before.speed) + fall) * passed_s + JUMP_M:
+        if moved_m > (max(now.speed, before.speed) + fall) * passed_s + MAX_UNEXPLAINED_M:
             speed = f"{before.speed:.2f} m/s before and {now.speed:.2f} m/s after"
             self.note(f"a jump of '{name}' by {moved_m:.3f} m in {passed_s:.3f} s, at {speed}", "")
 

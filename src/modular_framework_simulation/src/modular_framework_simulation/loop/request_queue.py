@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Passes work from any thread to the simulation loop: the physics engine must be used from one thread only."""
+"""Runs work of any thread in the simulation loop, because only one thread may use the physics engine."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _Request:
 
 
 class RequestQueue:
-    """Requests of other threads, carried out between physics steps in the order they came."""
+    """Requests of other threads, executed between physics steps in the order of arrival."""
 
     def __init__(self) -> None:
         self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
@@ -47,13 +47,13 @@ class RequestQueue:
         """Runs work in the loop's thread and waits for the result.
 
         Args:
-            what: Named in the error, for example "spawn_sdf_model".
-            work: Called in the loop's thread.
-            timeout_s: Longest wait until the loop begins it [s of real time].
+            what: Name of the work for the error message, for example "spawn_sdf_model".
+            work: Function that is called in the loop's thread.
+            timeout_s: Timeout of the start of the work [s of real time].
 
         Raises:
-            LoopTimeoutError: The loop did not begin it in time; the work is then not done later either.
-            Exception: Whatever the work raised.
+            LoopTimeoutError: The loop did not start the work in time, and will not start it later.
+            Exception: Any exception of the work.
         """
         request = _Request(work)
         self._requests.put(request)
@@ -62,22 +62,22 @@ class RequestQueue:
             with request.lock:
                 request.abandoned = not request.started
             if request.abandoned:
-                raise LoopTimeoutError(f"'{what}' waited {timeout_s:g} s for the simulation loop, in vain")
-            # Work that has begun will end: half a spawn cannot be undone.
+                raise LoopTimeoutError(f"the simulation loop did not start '{what}' within {timeout_s:g} s")
+            # Started work is completed, because a partial spawn cannot be undone.
             request.done.wait(timeout_s)
         if request.error is not None:
             raise request.error
         if not request.done.is_set():
-            raise LoopTimeoutError(f"'{what}' was begun by the simulation loop, but not ended in {2 * timeout_s:g} s")
+            raise LoopTimeoutError(f"the simulation loop did not complete '{what}' within {2 * timeout_s:g} s")
         return request.result  # type: ignore[no-any-return]
 
     def post(self, work: Callable[[], Any]) -> None:
-        """Runs work in the loop's thread without waiting; it must not raise."""
+        """Runs work in the loop's thread without waiting; the work must not raise an exception."""
         self._requests.put(_Request(work))
         self._arrived.set()
 
     def run_pending(self) -> None:
-        """Carries out what has arrived; called by the loop's thread between steps."""
+        """Executes all requests that have arrived; called by the loop's thread between steps."""
         if not self._arrived.is_set():
             return
         self._arrived.clear()
@@ -89,12 +89,12 @@ class RequestQueue:
             request.run()
 
     def serve(self, duration_s: float) -> None:
-        """Carries out what arrives within that time [s]; called by the loop's thread instead of sleeping."""
+        """Executes requests for a duration [s]; called by the loop's thread instead of sleeping."""
         end_s = time.monotonic() + duration_s
-        while (rest_s := end_s - time.monotonic()) > 0:
-            self._arrived.wait(rest_s)
+        while (remaining_s := end_s - time.monotonic()) > 0:
+            self._arrived.wait(remaining_s)
             self.run_pending()
 
     def wait(self, timeout_s: float) -> None:
-        """Waits until something has arrived, at most that long [s]."""
+        """Waits until a request arrives, or until the timeout [s]."""
         self._arrived.wait(timeout_s)

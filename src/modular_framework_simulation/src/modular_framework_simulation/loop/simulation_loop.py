@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop: controllers, physics and simulated time advance together, one step after the other, in one thread."""
+"""Simulation loop, which advances controllers, physics and simulated time in lock-step in one thread."""
 
 from __future__ import annotations
 
@@ -23,32 +23,39 @@ from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRob
 
 _PAUSED_TICK_S = 0.05
 _HELD_TICK_S = 0.004
-"""Real time between two looks for goals while time is held [s]."""
+"""Real time between two checks for goals while time is held [s]."""
 _STEPS_BEFORE_HOLD = 5
-"""Physics steps after a restart before time may be held: at time 0 nodes take the clock for not yet started."""
+"""Physics steps after a restart before time may be held; at time 0, nodes assume that the clock has not started."""
 _HALT_S = (0.1, 0.5)
-"""How long the robot is simulated after `stop` [s]: at least, so that its standstill is published; at most."""
-_AT_REST = 0.01
+"""Minimum and maximum simulated time after `stop` [s]; the minimum allows to publish the robot's standstill."""
+_REST_VELOCITY = 0.01
 
 
 class Controllers(Protocol):
-    """The methods of a controller manager that the loop calls."""
+    """Methods of a controller manager that the loop calls."""
 
     @property
     def moving(self) -> bool:
-        """Whether a controller carries out a goal."""
+        """Returns whether a controller executes a goal."""
 
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False, reset_reason: str = "") -> None:
-        """Runs one control cycle; a reset restarts the controllers first, and their goals end with the reason."""
+        """Runs one control cycle.
+
+        Args:
+            time_s: Simulated time [s].
+            period_s: Time since the last cycle [s].
+            reset_controllers: Whether the controllers restart first, which ends their goals.
+            reset_reason: Reason of the restart in the goals' results.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class Hook:
-    """An action that the loop's thread repeats while time advances.
+    """Action that the loop's thread repeats while time advances.
 
     Attributes:
-        period_ns: Simulated time from one call to the next [ns]; 0: every physics step.
-        action: Must be quick.
+        period_ns: Period in simulated time [ns]; 0 for every physics step.
+        action: Function that must return quickly.
     """
 
     period_ns: int
@@ -57,7 +64,7 @@ class Hook:
 
 @dataclass(frozen=True, slots=True)
 class Actors:
-    """The robot in the world and what drives it; a world without a robot has none."""
+    """The robot in the world with its hardware and controllers."""
 
     robot: RobotBody
     hardware: SimulatedRobotHW
@@ -68,12 +75,12 @@ class SimulationLoop:
     """Advances the world.
 
     Args:
-        world: What to advance.
-        pacer: Ties simulated to real time.
-        requests: Work of other threads.
-        actors: The robot; None for a world without one.
-        on_paused_tick: Called about 20 times a second while time stands still, so that the clock stays visible.
-        holds: Who holds time; nobody by default.
+        world: The world.
+        pacer: Synchronization of simulated and real time.
+        requests: Requests of other threads.
+        actors: The robot; None for a world without a robot.
+        on_paused_tick: Function called about 20 times per second while time is stopped, to keep the clock published.
+        holds: Holds of simulated time; None for no holds.
     """
 
     def __init__(
@@ -92,7 +99,7 @@ class SimulationLoop:
         self._actors = actors
         self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
         self._hooks: list[Hook] = []
-        self._hook_turns: list[int] = []
+        self._hook_periods: list[int] = []
         self._on_paused_tick = on_paused_tick
         self.holds = holds if holds is not None else TimeHolds(print)
         self._held_at = -1
@@ -103,21 +110,21 @@ class SimulationLoop:
 
     @property
     def held(self) -> bool:
-        """Whether time stands still because somebody holds it."""
+        """Returns whether time is stopped by a hold."""
         return self._held_at >= 0
 
     @property
     def paused(self) -> bool:
-        """Whether time is paused."""
+        """Returns whether time is paused."""
         return self._paused
 
     def add_hook(self, hook: Hook) -> None:
-        """Adds an action that is repeated while time advances; to be called before `run`."""
+        """Adds an action that is repeated while time advances; must be called before `run`."""
         self._hooks.append(hook)
-        self._hook_turns.append(0)
+        self._hook_periods.append(0)
 
     def pause(self) -> None:
-        """Stops time; requests are still carried out."""
+        """Pauses time; requests are still executed."""
         self._paused = True
 
     def unpause(self) -> None:
@@ -126,26 +133,30 @@ class SimulationLoop:
         self.pacer.start(self._time_s())
 
     def reset_poses(self) -> None:
-        """Puts models and robot at their initial poses, at rest, without forces of requests; time continues.
+        """Resets the models and the robot to their initial poses at rest, and removes requested forces.
 
-        Goals that controllers carry out end with that reason.
+        Time continues. The goals of controllers end with this reason.
         """
         self.world.reset_poses()
         self._restart_robot(RobotBody.reset, "the world was reset")
 
     def set_joints(self, name: str, positions: dict[str, float]) -> None:
-        """Puts joints of a model or of the robot at positions [rad or m], at rest.
+        """Sets joint positions of a model or robot, at rest.
+
+        Args:
+            name: Name of the model or robot.
+            positions: Positions by joint name [rad or m].
 
         Raises:
-            UnknownEntityError: There is no such model, or it has no such joint.
-            ModelChangeError: A position is beyond a limit, or a joint is not where it was put.
+            UnknownEntityError: The model or a joint does not exist.
+            ModelChangeError: A position exceeds a limit, or a joint does not keep its position.
         """
         set_joint_positions(self.world, name, positions)
         if self._actors is not None and self.world.body(name) is self._actors.robot.body:
-            self._restart_control("the joints were put elsewhere by a request")
+            self._restart_control("a request changed the joint positions")
 
     def _restart_robot(self, place: Callable[[RobotBody], None], reason: str) -> None:
-        """Puts the robot where it starts, with empty grippers, and restarts what drives it."""
+        """Resets the robot and the held objects, and restarts the robot's control."""
         for watch in self.grasp_watches:
             watch.reset()
         if self._actors is not None:
@@ -153,16 +164,16 @@ class SimulationLoop:
         self._restart_control(reason)
 
     def _restart_control(self, reason: str) -> None:
-        """Restarts hardware and controllers from the present joint positions; goals end with the reason."""
+        """Restarts hardware and controllers at the current joint positions; goals end with the reason."""
         if self._actors is not None:
             self._actors.hardware.read(self._time_s(), 0.0)
             self._actors.hardware.hold()
         self._reset_reason = reason
 
     def reset_all(self) -> None:
-        """Puts models and robot where they started, without forces of requests, and simulated time to 0.
+        """Resets the models and the robot to their initial poses, removes requested forces, and sets time to 0.
 
-        Goals that controllers carry out, and requests for time to pass, end.
+        Goals of controllers and requests to advance time end.
         """
         self.world.reset_time()
         self.world.reset_poses()
@@ -170,14 +181,14 @@ class SimulationLoop:
         self._begin_time(_STEPS_BEFORE_HOLD if self.holds.owners else 0)
 
     def restart(self) -> None:
-        """Begins again in an empty physics engine, with the world as at the start; spawned models are gone."""
+        """Restarts in an empty physics engine with the initial world; spawned models are removed."""
         self.world.restart()
         self.pacer.reset_factor()
-        self._restart_robot(RobotBody.reload, "the world began again")
+        self._restart_robot(RobotBody.reload, "the world was restarted")
         self._begin_time(_STEPS_BEFORE_HOLD)
 
     def _begin_time(self, steps: int) -> None:
-        """Ends requests for time to pass, makes the first steps, and keeps pace from there."""
+        """Ends requests to advance time, runs the first steps, and restarts the pacing."""
         self.holds.restart()
         for _ in range(steps):
             self.step()
@@ -189,7 +200,7 @@ class SimulationLoop:
         self._stop.set()
 
     def run(self) -> None:
-        """Advances the world until `stop` is called; a robot that moves then is brought to rest first."""
+        """Advances the world until `stop` is called, and then stops a moving robot."""
         self.pacer.start(self._time_s())
         while not self._stop.is_set():
             self.requests.run_pending()
@@ -197,7 +208,7 @@ class SimulationLoop:
             if self._paused:
                 self._on_paused_tick()
                 if self._actors is not None:
-                    # Controllers can be loaded and started while time is paused.
+                    # Controllers can also be loaded and started while time is paused.
                     self._update_controllers(self._actors.controllers, 0.0)
                 self.requests.wait(_PAUSED_TICK_S)
             elif self.holds.may_pass(self.world.steps, moving):
@@ -216,7 +227,7 @@ class SimulationLoop:
         self.pacer.keep(self._time_s(), idle, calm, still=idle and calm and self._actors is not None)
 
     def _stand_still(self) -> None:
-        """Lets the controllers take up goals while time is held; at first, lets them report the state of now."""
+        """Lets the controllers accept goals while time is held; the first call also publishes the current state."""
         now_s, first = self._time_s(), self._held_at != self.world.steps
         if first:
             self._held_at = self.world.steps
@@ -230,11 +241,11 @@ class SimulationLoop:
         self.requests.wait(_HELD_TICK_S)
 
     def _halt(self, robot: RobotBody) -> None:
-        """Lets the controllers hold the robot at its present position, and continues until it is at rest."""
+        """Makes the controllers hold the robot at its current position, and continues until the robot is at rest."""
         self._restart_control("the simulation ends")
-        begun_s = self._time_s()
-        for shortest_s in _HALT_S:
-            while self._time_s() - begun_s < shortest_s:
+        start_s = self._time_s()
+        for duration_s in _HALT_S:
+            while self._time_s() - start_s < duration_s:
                 self.step()
                 self.pacer.keep(self._time_s())
             robot.read()
@@ -242,8 +253,10 @@ class SimulationLoop:
                 return
 
     def _is_at_rest(self) -> bool:
-        """Whether no joint of the robot moved when they were last measured."""
-        return self._actors is None or all(abs(joint.velocity) < _AT_REST for joint in self._actors.robot.readings)
+        """Returns whether no joint of the robot moved at the last measurement."""
+        return self._actors is None or all(
+            abs(joint.velocity) < _REST_VELOCITY for joint in self._actors.robot.readings
+        )
 
     def _update_controllers(self, controllers: Controllers, period_s: float) -> None:
         reason, self._reset_reason = self._reset_reason, ""
@@ -253,7 +266,7 @@ class SimulationLoop:
             controllers.update(self._time_s(), period_s)
 
     def step(self) -> None:
-        """Advances the world by one physics step: measure, control, actuate, move."""
+        """Advances the world by one physics step: read, update, write, and simulate."""
         period_s = self.world.settings.time_step_s
         if self._actors is not None:
             now_s = self._time_s()
@@ -262,14 +275,14 @@ class SimulationLoop:
             self._actors.hardware.write(now_s, period_s)
         self.world.step()
         time_ns = self.world.time_ns
-        for rank, hook in enumerate(self._hooks):
-            turn = time_ns // hook.period_ns if hook.period_ns else self.world.steps
-            before, self._hook_turns[rank] = self._hook_turns[rank], turn
-            if turn > before:
+        for index, hook in enumerate(self._hooks):
+            period_index = time_ns // hook.period_ns if hook.period_ns else self.world.steps
+            before, self._hook_periods[index] = self._hook_periods[index], period_index
+            if period_index > before:
                 hook.action()
 
     def watch_grasps(self) -> None:
-        """Passes the contacts of the fingers to the grasp watch of their gripper, and lets the referee look; a hook."""
+        """Updates the grasp watches with the contacts of the fingers, and calls the referee; used as a hook."""
         self.referee.look()
         if self._actors is None:
             return
@@ -279,13 +292,13 @@ class SimulationLoop:
         self.world.carry(robot.body, [(held.model, held.carrier_link) for held in self.held_objects()])
 
     def _touched(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
-        """Returns the movable objects that a finger presses on."""
+        """Returns the names of the movable objects that a finger presses on."""
         contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
-        # The engine also lists bodies that are near each other and do not press.
+        # The engine also lists close bodies without contact force.
         return {each.model for each in contacts if each.force > 0.0 and not self.world.body(each.model).static}
 
     def held_objects(self) -> tuple[HeldObject, ...]:
-        """Returns what the grippers hold now; an object in two of them counts as held by the first."""
+        """Returns the currently held objects; an object in two grippers is held by the first gripper."""
         if self._actors is None:
             return ()
         robot = self._actors.robot

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Copies of the state of the world for the other threads of the process."""
+"""Copies of the world's state for other threads of the process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_engine import REST_LOOK_S
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 
-_LONGEST_NS = round(REST_LOOK_S * 1e9)
+_MAX_AGE_NS = round(REST_LOOK_S * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +23,13 @@ class LinkSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class ModelSnapshot:
-    """A model that is not a robot.
+    """State of a model that is not a robot.
 
     Attributes:
-        name: Instance name.
-        instance: Number that no other model of this run has: a model that was deleted and spawned again differs.
-        static: Never moves.
-        links: Those with collision shapes.
+        name: Name of the model in the world.
+        instance: Unique number of the model in this run, which changes if a model is deleted and spawned again.
+        static: Whether the model never moves.
+        links: Links with collision shapes.
     """
 
     name: str
@@ -40,13 +40,13 @@ class ModelSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class HeldObject:
-    """An object in a gripper.
+    """An object held by a gripper.
 
     Attributes:
-        model: Its instance name.
-        carrier_link: Link of the robot it is carried by.
-        carrier_in_world: Pose of that link.
-        touch_links: Links of the gripper, which may touch it.
+        model: Name of the object's model.
+        carrier_link: Robot link that carries the object.
+        carrier_in_world: Pose of the carrier link in the world frame.
+        touch_links: Links of the gripper that may touch the object.
     """
 
     model: str
@@ -57,14 +57,14 @@ class HeldObject:
 
 @dataclass(frozen=True, slots=True)
 class WorldSnapshot:
-    """Models and grasps at one moment.
+    """State of the models and grasps at one time.
 
     Attributes:
         time_s: Simulated time [s].
-        models: All models but robots.
-        held: What the grippers hold.
+        models: All models except robots.
+        held: Objects held by the grippers.
         time_ns: Simulated time [ns].
-        revision: Of the world: differs once something was spawned, deleted or moved by a request.
+        revision: Revision of the world, which changes when a request spawns, deletes or moves a model.
     """
 
     time_s: float
@@ -77,15 +77,15 @@ class WorldSnapshot:
 def take_snapshot(
     world: PhysicsWorld, held: tuple[HeldObject, ...], before: WorldSnapshot | None = None
 ) -> WorldSnapshot:
-    """Copies the state of the world; to be called from the loop's thread.
+    """Copies the state of the world; must be called from the loop's thread.
 
     Args:
-        world: The models.
-        held: What the grippers hold.
-        before: The last snapshot, at most REST_LOOK_S ago: models at rest are taken from it, which one that was touched
-            since then may not be any more. None copies the present state of every model.
+        world: World of the models.
+        held: Objects held by the grippers.
+        before: Last snapshot, at most REST_LOOK_S old; sleeping models are copied from the snapshot, although a model
+            may have been touched since. None copies the current state of every model.
     """
-    if before is not None and before.revision == world.revision and 0 <= world.time_ns - before.time_ns <= _LONGEST_NS:
+    if before is not None and before.revision == world.revision and 0 <= world.time_ns - before.time_ns <= _MAX_AGE_NS:
         moving = world.moving()
         models = tuple(_copy(world, model.name) if model.name in moving else model for model in before.models)
     else:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides whether simulated time may pass: nodes hold it while they compute, so that computing takes none of it.
+"""Decides whether simulated time may advance; nodes hold time while they compute.
 
-While anybody holds time it passes only while a controller carries out a goal, or while somebody asks for it. Both end
-in a known physics step, whatever the load of the machine. A hold ends by itself when its owner does not renew it.
+While a node holds time, simulated time advances only during the goals of controllers, or on request. A goal or request
+ends in a defined physics step, independent of the load of the machine. A hold expires unless its owner renews the hold.
 """
 
 from __future__ import annotations
@@ -12,26 +12,26 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-LONGEST_LEASE_S = 600.0
-LONGEST_SILENCE_S = 60.0
-"""Time that is held, but not during motions, passes again after so much real time without a goal or a request [s]: a
-node that waits for simulated time without asking for it would wait for ever."""
+MAX_LEASE_S = 600.0
+MAX_IDLE_S = 60.0
+"""Real time without a goal or request after which held time advances again [s], unless it is held during motions; a
+node that waits for simulated time without a request would otherwise wait forever."""
 
 Log = Callable[[str], None]
 
 
 class HoldError(ValueError):
-    """A hold is not possible as asked for."""
+    """A hold is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One hold.
+    """A hold of simulated time.
 
     Attributes:
-        during_motions: time stands still while controllers carry out goals, too.
-        lease_s: real time from one renewal to the next, at most [s].
-        end_s: when it ends by itself [s of the clock].
+        during_motions: Whether time is also held during the goals of controllers.
+        lease_s: Maximum real time between two renewals [s].
+        end_s: Clock time of the expiry [s].
     """
 
     during_motions: bool
@@ -39,17 +39,17 @@ class Hold:
     end_s: float
 
     def is_over(self, now_s: float) -> bool:
-        """Whether it has ended by itself."""
+        """Returns whether the hold has expired."""
         return now_s > self.end_s
 
 
 @dataclass(frozen=True, slots=True)
 class Advance:
-    """A request for time to pass.
+    """A request to advance time.
 
     Attributes:
-        step: physics step at which it has passed.
-        passed: set then, or when the world begins again.
+        step: Number of the physics step at which the request is complete.
+        passed: Event that is set on completion, or when the world restarts.
     """
 
     step: int
@@ -57,81 +57,81 @@ class Advance:
 
 
 class TimeHolds:
-    """The holds of simulated time, and the requests for it to pass; used by one thread, that of the loop.
+    """Holds of simulated time and requests to advance time; only used by the loop's thread.
 
     Args:
-        log: takes a line about a hold that ended by itself, or that keeps the world waiting.
-        clock: real time [s].
+        log: Function that logs an expired hold, or a hold that blocks the world.
+        clock: Function that returns real time [s].
     """
 
     def __init__(self, log: Log, clock: Callable[[], float] = time.monotonic) -> None:
         self._log, self._clock = log, clock
         self._holds: dict[str, Hold] = {}
         self._advances: list[Advance] = []
-        self._active_s = clock()
-        self._complained = False
+        self._last_activity_s = clock()
+        self._warned = False
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Who holds time."""
+        """Returns the owners of all holds."""
         return tuple(self._holds)
 
     def hold(self, owner: str, lease_s: float, during_motions: bool = False) -> None:
-        """Begins or renews a hold.
+        """Starts or renews a hold.
 
         Args:
-            owner: whose it is; a second hold of the same owner takes the place of the first.
-            lease_s: after so much real time it ends by itself [s].
-            during_motions: whether time stands still while controllers carry out goals, too.
+            owner: Name of the owner; a second hold of the same owner replaces the first.
+            lease_s: Real time until the hold expires [s].
+            during_motions: Whether time is also held during the goals of controllers.
 
         Raises:
-            HoldError: there is no owner, or the lease is out of range.
+            HoldError: The name of the owner is empty, or the lease is out of range.
         """
         if not owner:
             raise HoldError("a hold of simulated time needs the name of its owner")
-        if not 0.0 < lease_s <= LONGEST_LEASE_S:
-            raise HoldError(f"lease_s is {lease_s}; allowed is more than 0 and at most {LONGEST_LEASE_S:g} s")
+        if not 0.0 < lease_s <= MAX_LEASE_S:
+            raise HoldError(f"lease_s is {lease_s}; allowed: more than 0 and at most {MAX_LEASE_S:g} s")
         if owner not in self._holds:
             self.note_activity()
         self._holds[owner] = Hold(during_motions, lease_s, self._clock() + lease_s)
 
     def release(self, owner: str) -> bool:
-        """Ends a hold; returns whether there was one."""
+        """Ends a hold; returns whether the owner had a hold."""
         self.note_activity()
         return self._holds.pop(owner, None) is not None
 
     def advance(self, step: int) -> Advance:
-        """Asks for time to pass until a physics step."""
+        """Requests that time advances until a physics step."""
         self.note_activity()
-        asked = Advance(step, threading.Event())
-        self._advances.append(asked)
-        return asked
+        request = Advance(step, threading.Event())
+        self._advances.append(request)
+        return request
 
-    def give_up(self, asked: Advance) -> None:
-        """Withdraws a request for time to pass."""
-        self._advances = [other for other in self._advances if other is not asked]
+    def give_up(self, request: Advance) -> None:
+        """Withdraws a request to advance time."""
+        self._advances = [other for other in self._advances if other is not request]
 
     def restart(self) -> None:
-        """Ends the requests for time to pass: the world begins again."""
-        for asked in self._advances:
-            asked.passed.set()
+        """Completes all requests to advance time, because the world restarts."""
+        for request in self._advances:
+            request.passed.set()
         self._advances.clear()
         self.note_activity()
 
     def note_activity(self) -> None:
-        """Notes that somebody does something with the world."""
-        self._active_s, self._complained = self._clock(), False
+        """Records that a node uses the world."""
+        self._last_activity_s, self._warned = self._clock(), False
 
     def may_pass(self, step: int, moving: bool) -> bool:
-        """Returns whether the next physics step may be made.
+        """Returns whether the next physics step may run.
 
         Args:
-            step: number of steps made.
-            moving: whether a controller carries out a goal.
+            step: Number of completed steps.
+            moving: Whether a controller executes a goal.
         """
-        for asked in [asked for asked in self._advances if asked.step <= step]:
-            asked.passed.set()
-            self.give_up(asked)
+        for request in [request for request in self._advances if request.step <= step]:
+            request.passed.set()
+            self.give_up(request)
             self.note_activity()
         if not self._holds:
             return True
@@ -141,7 +141,7 @@ class TimeHolds:
             return False
         if moving:
             self.note_activity()
-        return not self._holds or moving or bool(self._advances) or self._silent()
+        return not self._holds or moving or bool(self._advances) or self._idle_too_long()
 
     def _end_expired(self) -> None:
         now_s = self._clock()
@@ -149,18 +149,18 @@ class TimeHolds:
             if hold.is_over(now_s):
                 del self._holds[owner]
                 self._log(
-                    f"'{owner}' held simulated time and has not renewed that for {hold.lease_s:g} s: its hold is over"
+                    f"the hold of simulated time by '{owner}' has expired: it was not renewed for {hold.lease_s:g} s"
                 )
 
-    def _silent(self) -> bool:
-        """Returns whether nothing happened for so long that somebody seems to wait for time without asking for it."""
-        if self._clock() - self._active_s < LONGEST_SILENCE_S:
+    def _idle_too_long(self) -> bool:
+        """Returns whether the world was unused for so long that a node probably waits for time without a request."""
+        if self._clock() - self._last_activity_s < MAX_IDLE_S:
             return False
-        if not self._complained:
-            self._complained = True
+        if not self._warned:
+            self._warned = True
             self._log(
-                f"simulated time passes although {', '.join(self._holds)} hold it: nothing was asked of the world for "
-                f"{LONGEST_SILENCE_S:g} s. A node that waits for simulated time has to ask for it (AdvanceTime); what "
-                "follows is not repeatable"
+                f"simulated time advances although {', '.join(self._holds)} hold it, because no node used the world "
+                f"for {MAX_IDLE_S:g} s. A node that waits for simulated time must request it (AdvanceTime); the run "
+                "is not repeatable from here on"
             )
         return True

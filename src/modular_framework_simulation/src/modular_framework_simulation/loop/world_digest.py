@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A hash of the motion of everything in the world, to compare two runs bit for bit and to find where they part."""
+"""Hashes the motion of the world, to compare two runs bit for bit and to find their first difference."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ CHECKPOINT_STEPS = 50
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """The hash of all steps up to one of them."""
+    """Hash of all physics steps up to and including `step`."""
 
     step: int
     digest: str
 
 
 class WorldDigest:
-    """Hashes joint positions and velocities of the robot, and poses of the models, after every physics step.
+    """Hashes the robot's joint positions and velocities and the models' poses after every physics step.
 
     Args:
-        world: The models.
-        robot: The robot; None for a world without one.
+        world: World of the models.
+        robot: The robot; None for a world without a robot.
     """
 
     def __init__(self, world: PhysicsWorld, robot: RobotBody | None) -> None:
@@ -36,7 +36,7 @@ class WorldDigest:
         self.checkpoints: list[Checkpoint] = []
 
     def add(self) -> None:
-        """Adds the state after a step; the world's first step begins a new hash."""
+        """Adds the state after a step; the first step of the world starts a new hash."""
         step = self._world.steps
         if step <= self._last_step:
             self._hash, self.checkpoints = hashlib.sha256(), []

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Worlds, models and robots as their files describe them: plain values, without the physics engine."""
+"""Plain values that describe worlds, models and robots, independent of the physics engine."""

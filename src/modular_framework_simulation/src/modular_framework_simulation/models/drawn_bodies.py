@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Triangles of simple shapes, with the places of a picture on them."""
+"""Creates triangle meshes of simple shapes with texture coordinates."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from modular_framework_simulation.models.sdf_specs import Colour
 
-_ROUND = 64
-"""Sides of a round shape; its surface is drawn within 0.12 % of its radius."""
+_ROUND_SIDES = 64
+"""Number of sides of a round shape; the drawn surface deviates by at most 0.12 % of the radius."""
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnBody:
-    """Triangles with one look.
+    """Triangles with a common appearance.
 
     Attributes:
-        vertices: shape (n, 3) [m].
-        triangles: indices of vertices, shape (m, 3), counter-clockwise seen from outside.
-        normals: of the vertices; None for flat triangles.
-        uv: where the vertices are in the picture, (0, 0) its lower left corner; None without a picture.
-        colour: what the picture is multiplied with, or the plain colour.
-        picture: an image of Pillow; None for a plain colour.
+        vertices: Vertex positions, shape (n, 3) [m].
+        triangles: Vertex indices, shape (m, 3), counter-clockwise seen from outside.
+        normals: Vertex normals, shape (n, 3); None for flat triangles.
+        uv: Texture coordinates, shape (n, 2), with (0, 0) in the lower left corner; None without a texture.
+        colour: Plain colour, or the factor of the texture's colours.
+        image: Texture as a Pillow image; None for a plain colour.
     """
 
     vertices: Array
@@ -35,11 +35,18 @@ class DrawnBody:
     normals: Array | None
     uv: Array | None
     colour: Colour
-    picture: Any
+    image: Any
 
 
-def drawn_plane(normal: Array, size: tuple[float, float], colour: Colour, picture: Any) -> DrawnBody:
-    """Returns a rectangle across a normal, as large as it is to be drawn."""
+def drawn_plane(normal: Array, size: tuple[float, float], colour: Colour, image: Any) -> DrawnBody:
+    """Creates a rectangle.
+
+    Args:
+        normal: Unit normal of the rectangle, shape (3,).
+        size: Edge lengths [m].
+        colour: Plain colour, or the factor of the texture's colours.
+        image: Texture as a Pillow image; None for a plain colour.
+    """
     helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     across = np.cross(normal, np.cross(helper, normal))
     across /= np.linalg.norm(across)
@@ -47,11 +54,17 @@ def drawn_plane(normal: Array, size: tuple[float, float], colour: Colour, pictur
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
     vertices = corners[:, :1] * size[0] * across + corners[:, 1:] * size[1] * up
     triangles = np.array([(0, 1, 2), (0, 2, 3)])
-    return DrawnBody(vertices, triangles, np.tile(normal, (4, 1)), corners + 0.5, colour, picture)
+    return DrawnBody(vertices, triangles, np.tile(normal, (4, 1)), corners + 0.5, colour, image)
 
 
-def drawn_box(size: Array, colour: Colour, picture: Any) -> DrawnBody:
-    """Returns a box whose six sides all show the picture."""
+def drawn_box(size: Array, colour: Colour, image: Any) -> DrawnBody:
+    """Creates a box with the texture on each of its six sides.
+
+    Args:
+        size: Edge lengths, shape (3,) [m].
+        colour: Plain colour, or the factor of the texture's colours.
+        image: Texture as a Pillow image; None for a plain colour.
+    """
     vertices: list[Array] = []
     triangles, normals, uv = [], [], []
     for axis in range(3):
@@ -75,32 +88,45 @@ def drawn_box(size: Array, colour: Colour, picture: Any) -> DrawnBody:
         np.concatenate(normals),
         np.concatenate(uv),
         colour,
-        picture,
+        image,
     )
 
 
-def drawn_cylinder(radius: float, length: float, colour: Colour, picture: Any) -> DrawnBody:
-    """Returns a cylinder with the picture around it; edges are there twice, for they are sharp."""
+def drawn_cylinder(radius: float, length: float, colour: Colour, image: Any) -> DrawnBody:
+    """Creates a cylinder along z with the texture around it; duplicate vertices keep the edges sharp.
+
+    Args:
+        radius: Cylinder radius [m].
+        length: Cylinder length [m].
+        colour: Plain colour, or the factor of the texture's colours.
+        image: Texture as a Pillow image; None for a plain colour.
+    """
     half = length / 2
     outline = [(0.0, -half), (radius, -half), (radius, -half), (radius, half), (radius, half), (0.0, half)]
-    return _turned(np.array(outline), colour, picture)
+    return _revolved(np.array(outline), colour, image)
 
 
-def drawn_sphere(radius: float, colour: Colour, picture: Any) -> DrawnBody:
-    """Returns a sphere with the picture around it."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
-    body = _turned(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, picture)
+def drawn_sphere(radius: float, colour: Colour, image: Any) -> DrawnBody:
+    """Creates a sphere with the texture around it.
+
+    Args:
+        radius: Sphere radius [m].
+        colour: Plain colour, or the factor of the texture's colours.
+        image: Texture as a Pillow image; None for a plain colour.
+    """
+    angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND_SIDES // 2 + 1)
+    body = _revolved(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, image)
     return replace(body, normals=body.vertices / radius)
 
 
-def _turned(outline: Array, colour: Colour, picture: Any) -> DrawnBody:
-    """Returns the surface that an outline of radius and height makes when it turns about z."""
-    turns = np.linspace(0, 2 * np.pi, _ROUND + 1)
+def _revolved(outline: Array, colour: Colour, image: Any) -> DrawnBody:
+    """Creates the surface of revolution about z of an outline of (radius, height) points."""
+    angles = np.linspace(0, 2 * np.pi, _ROUND_SIDES + 1)
     low, high = outline[:, 1].min(), outline[:, 1].max()
-    vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in outline for a in turns])
-    # Pictures for round shapes stand on their head, as Gazebo wraps them.
-    uv = np.array([(1 - a / (2 * np.pi), 1 - (z - low) / (high - low)) for _, z in outline for a in turns])
-    row = len(turns)
-    corners = [(i * row + j, i * row + j + 1) for i in range(len(outline) - 1) for j in range(_ROUND)]
+    vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in outline for a in angles])
+    # Gazebo wraps textures upside down around round shapes.
+    uv = np.array([(1 - a / (2 * np.pi), 1 - (z - low) / (high - low)) for _, z in outline for a in angles])
+    row = len(angles)
+    corners = [(i * row + j, i * row + j + 1) for i in range(len(outline) - 1) for j in range(_ROUND_SIDES)]
     triangles = np.array([t for a, b in corners for t in ((a, b, b + row), (a, b + row, a + row))])
-    return DrawnBody(vertices, triangles, None, uv, colour, picture)
+    return DrawnBody(vertices, triangles, None, uv, colour, image)

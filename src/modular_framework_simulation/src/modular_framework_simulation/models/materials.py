@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the colour and the picture that the name of a material stands for."""
+"""Finds the colour and texture of a named material."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ _GAZEBO_RGB: dict[str, tuple[float, float, float]] = {
     "LightOff": (1, 0, 0),
     "JointAnchor": (1, 1, 1),
 }
-"""Diffuse colours of the materials that Gazebo comes with."""
+"""Diffuse colours of Gazebo's materials."""
 
-_GAZEBO_PICTURES_RGB: dict[str, tuple[float, float, float]] = {
+_GAZEBO_TEXTURES_RGB: dict[str, tuple[float, float, float]] = {
     "Wood": (0.6, 0.43, 0.26),
     "WoodFloor": (0.55, 0.38, 0.22),
     "WoodPallet": (0.66, 0.53, 0.36),
@@ -68,7 +68,7 @@ _GAZEBO_PICTURES_RGB: dict[str, tuple[float, float, float]] = {
     "GreyGradientSky": (0.75, 0.75, 0.75),
     "Grass": (0.3, 0.5, 0.2),
 }
-"""Plain colours in place of the pictures that Gazebo comes with, chosen by eye."""
+"""Plain colours that replace the textures of Gazebo's materials, chosen by eye."""
 
 _GLOW, _TRANSPARENT = re.compile("Glow(Outline)?$"), re.compile("(Transparent(Overlay)?|Laser)$")
 _TRANSPARENT_ALPHA = 0.5
@@ -76,12 +76,12 @@ _TRANSPARENT_ALPHA = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a surface looks.
+    """Appearance of a surface.
 
     Attributes:
         colour: Diffuse colour.
-        texture: Image file; None for a plain colour.
-        missing_texture: Name of an image file that is not there; empty where none is missing.
+        texture: Image file of the texture; None for a plain colour.
+        missing_texture: Name of a missing image file; empty if no file is missing.
     """
 
     colour: Colour = GREY
@@ -90,23 +90,23 @@ class Material:
 
 
 def gazebo_material(name: str) -> Material | None:
-    """Returns a material Gazebo comes with, by its name with or without "Gazebo/"; None if there is none."""
+    """Returns a Gazebo material by name, with or without the prefix "Gazebo/"; None if the name is unknown."""
     short = name.removeprefix(GAZEBO_PREFIX)
     alpha = _TRANSPARENT_ALPHA if _TRANSPARENT.search(short) else 1.0
     plain = _TRANSPARENT.sub("", _GLOW.sub("", short))
-    rgb = _GAZEBO_RGB.get(plain) or _GAZEBO_PICTURES_RGB.get(plain)
+    rgb = _GAZEBO_RGB.get(plain) or _GAZEBO_TEXTURES_RGB.get(plain)
     return Material((*rgb, alpha)) if rgb is not None else None
 
 
 def script_material(script: XmlNode, resources: Resources) -> Material:
-    """Returns the material that a <script> names.
+    """Returns the material of a <script>.
 
     Args:
-        script: With a <name> and <uri> elements of files or folders.
-        resources: Where these are found.
+        script: Element with a <name> and with <uri> elements of files or folders.
+        resources: Folders and packages for the URIs.
 
     Raises:
-        DescriptionError: There is no material of that name.
+        DescriptionError: The material is unknown.
     """
     name_node = script.find("name")
     name = name_node.text.strip() if name_node is not None else script.text.strip()
@@ -114,7 +114,7 @@ def script_material(script: XmlNode, resources: Resources) -> Material:
     for uri in script.find_all("uri"):
         try:
             folders.append(resources.resolve(uri, uri.text.strip()))
-        except DescriptionError:  # Gazebo's own files are rarely there; the name may be known without them
+        except DescriptionError:  # Gazebo's own files are rarely installed; the name may be known without the files
             continue
     for folder in folders:
         material = _in_scripts(folder, name, folders)
@@ -122,8 +122,8 @@ def script_material(script: XmlNode, resources: Resources) -> Material:
             return material
     known = gazebo_material(name) if name.startswith(GAZEBO_PREFIX) else None
     if known is None:
-        looked = ", ".join(str(folder) for folder in folders) or "no file that is there"
-        raise DescriptionError(script.where, f"no material '{name}' is found", f"looked in {looked}")
+        looked = ", ".join(str(folder) for folder in folders) or "no existing file"
+        raise DescriptionError(script.where, f"material '{name}' is not found", f"looked in {looked}")
     return known
 
 
@@ -137,16 +137,16 @@ def _in_scripts(folder: Path, name: str, folders: list[Path]) -> Material | None
         except OSError:
             continue
         if name in entries:
-            colour, picture = entries[name]
-            texture = _find_picture(picture, [*folders, file.parent, file.parent.parent / "textures"])
-            return Material(colour, texture, picture if texture is None else "")
+            colour, image = entries[name]
+            texture = _find_image(image, [*folders, file.parent, file.parent.parent / "textures"])
+            return Material(colour, texture, image if texture is None else "")
     return None
 
 
-def _find_picture(picture: str, folders: list[Path]) -> Path | None:
-    if not picture:
+def _find_image(image: str, folders: list[Path]) -> Path | None:
+    if not image:
         return None
-    return next((folder / picture for folder in folders if (folder / picture).is_file()), None)
+    return next((folder / image for folder in folders if (folder / image).is_file()), None)
 
 
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
@@ -154,10 +154,13 @@ _TOKEN = re.compile(r"[{}]|[^{}\n]+")
 
 
 def parse_material_script(text: str) -> dict[str, tuple[Colour, str]]:
-    """Returns colour and picture ("" for none) of the materials in a script of the Ogre engine, by name.
+    """Parses a material script of the Ogre engine.
 
-    A material may be based on one above it (`material Child : Parent`). What is not given is white with a picture and
-    grey without.
+    A material may inherit from a previous material (`material Child : Parent`). The default colour is white with a
+    texture and grey without a texture.
+
+    Returns:
+        Colour and texture file ("" for none), by name of the material.
     """
     found: dict[str, tuple[Colour | None, str]] = {}
     name, depth = "", 0
@@ -179,10 +182,10 @@ def parse_material_script(text: str) -> dict[str, tuple[Colour, str]]:
                 found[name] = (_colour(numbers) or found[name][0], found[name][1])
             case ["ambient", *numbers] if name and depth > 0 and found[name][0] is None:
                 found[name] = (_colour(numbers), found[name][1])
-            case ["texture", picture, *_] if name and depth > 0 and not found[name][1]:
-                found[name] = (found[name][0], picture.strip('"'))
+            case ["texture", image, *_] if name and depth > 0 and not found[name][1]:
+                found[name] = (found[name][0], image.strip('"'))
     white: Colour = (1.0, 1.0, 1.0, 1.0)
-    return {key: (colour or (white if picture else GREY), picture) for key, (colour, picture) in found.items()}
+    return {key: (colour or (white if image else GREY), image) for key, (colour, image) in found.items()}
 
 
 def _colour(words: list[str]) -> Colour | None:

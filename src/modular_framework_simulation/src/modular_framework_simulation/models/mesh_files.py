@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prepares the meshes of descriptions for the physics engine: exact, as hulls, or decomposed into convex parts.
+"""Converts meshes for the physics engine: exact triangles, convex hulls or convex parts.
 
-The engine computes contacts of convex bodies only, so a mesh that is not convex is decomposed by CoACD. That takes
-seconds, therefore the parts are kept in a cache folder under a name made of the mesh's own content.
+The engine computes contacts of convex bodies only, so CoACD decomposes every non-convex mesh. A decomposition takes
+seconds; the parts are cached in a folder named by a hash of the mesh.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from modular_framework_urdf.mesh_reader import MeshError, TriangleMesh, read_mes
 
 _CACHE_VERSION = "3"
 _CONCAVITY_THRESHOLD = 0.03
-"""CoACD's measure of how much a part may differ from its hull, relative to the size of the mesh."""
+"""CoACD's limit of the concavity of a part, relative to the size of the mesh."""
 
-_CONVEX_VOLUME_SHARE = 0.985
-"""A mesh that fills this share of its convex hull is treated as convex."""
+_MIN_CONVEX_VOLUME_RATIO = 0.985
+"""Minimum ratio of a mesh's volume to its convex hull's volume for a mesh that is treated as convex."""
 
 
 def load_mesh(mesh: Mesh) -> TriangleMesh:
-    """Reads a mesh file, triangle for triangle, and scales it.
+    """Reads and scales a mesh file without other changes to the triangles.
 
     Raises:
-        DescriptionError: The file cannot be read whole or holds no triangles.
+        DescriptionError: The file cannot be read completely, or has no triangles.
     """
     try:
         return read_mesh(mesh.path, mesh.scale, mesh.submesh, mesh.center)
@@ -42,21 +42,21 @@ def load_mesh(mesh: Mesh) -> TriangleMesh:
 
 
 def default_cache_folder() -> Path:
-    """Returns where convex parts are kept: below $ROS_HOME, or ~/.ros without it."""
+    """Returns the default cache folder of convex parts, below $ROS_HOME or ~/.ros."""
     home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
     return Path(home) / "modular_framework" / "convex_parts"
 
 
 def _silent(_text: str) -> None:
-    """Takes a line and drops it."""
+    """Discards a message."""
 
 
 class ConvexParts:
-    """Gives the convex parts of meshes as .obj files, from the cache when they are there.
+    """Converts meshes into .obj files of convex parts, and caches the files.
 
     Args:
-        cache_folder: Made when first needed.
-        log: Takes a line of text when something begins that may take minutes.
+        cache_folder: Folder of the cache, created when needed.
+        log: Function that logs a message before a step that may take minutes.
     """
 
     def __init__(self, cache_folder: Path, log: Callable[[str], None] = _silent) -> None:
@@ -65,11 +65,11 @@ class ConvexParts:
 
     @property
     def cache_folder(self) -> Path:
-        """Where the parts are kept."""
+        """Returns the folder of the cache."""
         return self._cache_folder
 
     def hull(self, mesh: Mesh) -> Path:
-        """Returns an .obj file with the convex hull of a mesh.
+        """Returns the .obj file of the convex hull of a mesh.
 
         Raises:
             DescriptionError: The mesh cannot be read or has no volume.
@@ -77,7 +77,7 @@ class ConvexParts:
         return self._cached(mesh, "hull")[0]
 
     def parts(self, mesh: Mesh) -> tuple[Path, ...]:
-        """Returns .obj files of convex parts that together make up the mesh; one if it is convex already.
+        """Returns the .obj files of the convex parts of a mesh; a single file for a convex mesh.
 
         Raises:
             DescriptionError: The mesh cannot be read or has no volume.
@@ -85,7 +85,7 @@ class ConvexParts:
         return self._cached(mesh, "parts")
 
     def exact(self, mesh: Mesh) -> Path:
-        """Returns an .obj file with the triangles as they are, for bodies that never move."""
+        """Returns the .obj file of a mesh with unchanged triangles, for static bodies."""
         return self._cached(mesh, "exact")[0]
 
     def _cached(self, mesh: Mesh, kind: str) -> tuple[Path, ...]:
@@ -112,31 +112,31 @@ class ConvexParts:
             hull = solid.convex_hull
         except Exception as error:  # qhull reports flat point sets by its own exceptions
             raise DescriptionError(str(mesh.path), f"has no convex hull ({error})", "expected a solid") from error
-        filled = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
-        if kind == "hull" or filled > _CONVEX_VOLUME_SHARE:
+        volume_ratio = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
+        if kind == "hull" or volume_ratio > _MIN_CONVEX_VOLUME_RATIO:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
         self._log(
-            f"cutting {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take minutes; "
-            f"they are kept in {self._cache_folder}"
+            f"decomposing {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take "
+            f"minutes; the parts are cached in {self._cache_folder}"
         )
-        if not solid.is_volume:  # a hole would make a shell of it, which is cut into many more parts
+        if not solid.is_volume:  # CoACD would decompose an open mesh as a shell, into many more parts
             repair: Any = trimesh.repair
             repair.fill_holes(solid)
             repair.fix_normals(solid)
         if not solid.is_volume:
-            return _within(_decompose(loaded), hull)
+            return _clipped_to(_decompose(loaded), hull)
         return _decompose(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)))
 
 
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
-    """Makes a folder of the cache, whole or not at all.
+    """Creates a folder of the cache, completely or not at all.
 
     Args:
-        folder: Its path; what is above it is made too.
-        files: Contents by name.
+        folder: Path of the folder; missing parent folders are created.
+        files: Contents by file name.
 
     Raises:
-        DescriptionError: There is no room or no permission for it.
+        DescriptionError: The disk is full or the folder is not writable.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     scratch = folder.with_name(f".{uuid.uuid4().hex}")
@@ -146,28 +146,28 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
             (scratch / name).write_bytes(content)
         scratch.rename(folder)
     except OSError as error:
-        if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
+        if not folder.is_dir():  # otherwise another process has created the same folder
             raise DescriptionError(
                 str(folder),
                 f"cannot be written ({error.strerror})",
-                "free space, or set ROS_HOME to a folder that has some",
+                "free disk space, or set ROS_HOME to a folder on another disk",
             ) from error
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
+        shutil.rmtree(scratch, ignore_errors=True)  # renamed already if all went well
 
 
 def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:
-    import coacd  # loading it takes long and most worlds never need it
+    import coacd  # slow to import, and most worlds do not need decomposition
 
     coacd.set_log_level("error")
     pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.triangles), threshold=_CONCAVITY_THRESHOLD, seed=1)
     return [TriangleMesh(np.asarray(vertices), np.asarray(faces)) for vertices, faces in pieces]
 
 
-def _within(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
-    """Returns what of convex parts is inside the hull of their mesh.
+def _clipped_to(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
+    """Clips convex parts to the hull of their mesh.
 
-    CoACD closes an open mesh with a skin of voxels, which stands out by a hundredth of the mesh's size.
+    CoACD closes an open mesh with a layer of voxels, which protrudes by about 1 % of the mesh's size.
     """
     import trimesh
 
@@ -176,7 +176,7 @@ def _within(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
         solid = trimesh.Trimesh(part.vertices, part.triangles).convex_hull
         inside = trimesh.boolean.intersection([solid, hull], engine="manifold", check_volume=False)
         if len(inside.faces):
-            inside = inside.convex_hull  # which it is already, but for rounding
+            inside = inside.convex_hull  # corrects rounding errors; the intersection of convex parts is convex
             clipped.append(TriangleMesh(np.asarray(inside.vertices), np.asarray(inside.faces)))
     return clipped
 

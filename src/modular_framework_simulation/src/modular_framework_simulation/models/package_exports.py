@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the folders of models and media that ROS packages export for Gazebo.
+"""Finds the model and media folders that ROS packages export for Gazebo.
 
-A package exports them in its package.xml, as gazebo_ros reads it:
+A package declares the folders in its package.xml, as in gazebo_ros:
 `<export><gazebo_ros gazebo_model_path="${prefix}/models" gazebo_media_path="${prefix}"/></export>`.
 """
 
@@ -17,20 +17,20 @@ MODEL_EXPORT, MEDIA_EXPORT = "gazebo_model_path", "gazebo_media_path"
 
 
 def exported_folders(packages: Iterable[Path], export: str) -> tuple[Path, ...]:
-    """Returns the folders that packages export.
+    """Returns the exported folders of packages.
 
     Args:
-        packages: Folders of packages.
-        export: Which of the two exports.
+        packages: Package folders.
+        export: `MODEL_EXPORT` or `MEDIA_EXPORT`.
     """
     folders: dict[Path, None] = {}
     for package in packages:
         manifest = package / "package.xml"
         try:
-            if export.encode() not in manifest.read_bytes():  # few do: the others need no parsing
+            if export.encode() not in manifest.read_bytes():  # parse only the few packages with an export
                 continue
             root = read_xml(manifest)
-        except (OSError, DescriptionError):  # a broken package is for those to complain about who build it
+        except (OSError, DescriptionError):  # catkin reports broken packages
             continue
         for node in root.find_all("export"):
             for entry in node.find_all("gazebo_ros"):

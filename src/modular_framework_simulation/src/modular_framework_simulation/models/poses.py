@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rigid transforms of the simulated world, small enough to be composed thousands of times a second."""
+"""Rigid transforms of the simulated world, fast enough for thousands of compositions per second."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _ORIGIN: Vector3 = (0.0, 0.0, 0.0)
 
 
 def normalised_quaternion(quaternion: Quaternion) -> Quaternion:
-    """Returns the quaternion at unit length; all zeros (an unset message) is the identity.
+    """Returns the normalised quaternion; the identity for all zeros, as in an unset message.
 
     Raises:
-        ValueError: An element is not finite, or the length is neither zero nor within 10 % of one.
+        ValueError: An element is not finite, or the length is neither 0 nor within 10 % of 1.
     """
     norm = math.sqrt(sum(value * value for value in quaternion))
     if norm == 0.0:
@@ -35,11 +35,11 @@ def normalised_quaternion(quaternion: Quaternion) -> Quaternion:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A rigid transform: the pose of a child frame in its parent frame.
+    """Rigid transform: the pose of a child frame in its parent frame.
 
     Attributes:
-        position: Origin of the child frame [m].
-        quaternion: Unit rotation, xyzw.
+        position: Origin of the child frame in the parent frame, x, y, z [m].
+        quaternion: Orientation of the child frame, unit quaternion xyzw.
     """
 
     position: Vector3 = _ORIGIN
@@ -47,11 +47,11 @@ class Pose:
 
     @staticmethod
     def from_xyz_rpy(xyz: Vector3, rpy: Vector3) -> Pose:
-        """Builds a pose from a position [m] and roll, pitch, yaw [rad]."""
+        """Returns the pose with a position [m] and roll, pitch, yaw [rad]."""
         return Pose(xyz, quaternion_from_rpy(*rpy))
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Returns the pose of other's child frame in this pose's parent frame."""
+        """Returns the pose of the child frame of `other` in the parent frame of this pose."""
         x, y, z = rotate_vector(self.quaternion, other.position)
         px, py, pz = self.position
         return Pose((px + x, py + y, pz + z), multiply_quaternions(self.quaternion, other.quaternion))
@@ -59,12 +59,12 @@ class Pose:
     def inverse(self) -> Pose:
         """Returns the pose of the parent frame in the child frame."""
         x, y, z, w = self.quaternion
-        back = (-x, -y, -z, w)
-        px, py, pz = rotate_vector(back, self.position)
-        return Pose((-px, -py, -pz), back)
+        conjugate = (-x, -y, -z, w)
+        px, py, pz = rotate_vector(conjugate, self.position)
+        return Pose((-px, -py, -pz), conjugate)
 
     def distance_to(self, other: Pose) -> tuple[float, float]:
-        """Returns how far apart two poses of one frame are: translation [m] and rotation angle [rad]."""
+        """Returns the distance between two poses in the same frame: translation [m] and rotation angle [rad]."""
         translation = math.dist(self.position, other.position)
         dot = abs(sum(a * b for a, b in zip(self.quaternion, other.quaternion, strict=True)))
         return translation, 2 * math.acos(min(1.0, dot))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads what the simulation needs of a robot's URDF, and rewrites the URDF for the physics engine.
+"""Reads a robot's URDF for the simulation, and rewrites the URDF for the physics engine.
 
-The engine gets convex hulls in place of the collision meshes and, without a window, no visual shapes: it then loads in
-a fraction of the time and computes contacts faster.
+In the rewritten URDF, convex hulls replace the collision meshes, and without a window the visual shapes are removed.
+The engine then loads the robot and computes its contacts faster.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ COMMAND_INTERFACES = {
     "velocity": "hardware_interface/VelocityJointInterface",
     "effort": "hardware_interface/EffortJointInterface",
 }
-"""By ros2_control's name of what a joint is commanded: ros_control's."""
+"""Hardware interfaces of ros_control, by command interface of ros2_control."""
 
-FAR = 1e6
-"""Limit of a mimic joint whose leader has none [rad or m]."""
+MAX_MIMIC_LIMIT = 1e6
+"""Magnitude of a mimic joint's limits if the leading joint has no limits [rad or m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotDescription:
-    """A robot as the simulation sees it.
+    """Robot description for the simulation.
 
     Attributes:
-        name: Name of the robot in its description.
-        joints: The movable joints, in file order.
-        links: All link names, in file order.
-        parents: Parent link of every link that has one.
-        engine_urdf: The URDF for the physics engine.
-        initial_positions: Where the description lets joints begin [rad or m], by name.
-        frictions: Coefficients of friction (`<mu1>` of a `<gazebo reference=...>`) by link, where the description says.
+        name: Name of the robot in the description.
+        joints: Movable joints, in file order.
+        links: Names of all links, in file order.
+        parents: Parent link by child link.
+        engine_urdf: URDF for the physics engine.
+        initial_positions: Initial joint positions in the description [rad or m], by joint name.
+        frictions: Friction coefficients (`<mu1>` of `<gazebo reference=...>`), by link name.
     """
 
     name: str
@@ -66,13 +66,13 @@ def read_robot(
     """Reads a robot description.
 
     Args:
-        text: URDF.
-        find_package: Looks up the packages of package:// URIs.
-        convex_parts: Makes convex hulls of collision meshes.
+        text: URDF text.
+        find_package: Function that finds the packages of package:// URIs.
+        convex_parts: Converter of collision meshes into convex hulls.
         with_visuals: Whether visual shapes are kept.
 
     Raises:
-        DescriptionError: The text is no URDF, or refers to something that is not there.
+        DescriptionError: The text is not a valid URDF, or refers to a missing file.
     """
     try:
         root, robot = xml_text.parse(text, "robot_description"), read_urdf(text)
@@ -86,7 +86,7 @@ def read_robot(
         raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")
     simulated = _simulated_joints(text, robot)
     interfaces = _interfaces(robot) | {joint.name: _commands(joint) for joint in simulated}
-    _require_ends(robot)
+    _require_parent_and_child(robot)
     joints = _with_leaders(tuple(_joint(joint, interfaces.get(joint.name, ())) for joint in robot.movable_joints()))
     _set_limits(root, joints)
     give_masses(root, robot, find_package)
@@ -100,10 +100,10 @@ def read_robot(
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
-    """Lets every mimic joint follow the joint that drives its chain of mimic joints, through the whole range of that.
+    """Resolves chains of mimic joints to their leading joints, and widens the limits to the leading joint's range.
 
-    The limits of a mimic joint only ever widen: Gazebo's mimic plugins and MoveIt ignore them, so that public
-    descriptions have limits that forbid the relation (Robotiq 2F-85: multiplier -1, limits 0 to 0.88).
+    Gazebo's mimic plugins and MoveIt ignore the limits of mimic joints. Some public descriptions therefore have limits
+    that forbid the relation (Robotiq 2F-85: multiplier -1, limits 0 to 0.88).
     """
     try:
         mimics = resolved(
@@ -114,29 +114,29 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
         raise DescriptionError(f"robot_description: {where}", *problem.split("; ", 1)) from error
     by_name = {joint.name: joint for joint in joints}
     return tuple(
-        _following(joint, mimics[joint.name], by_name[mimics[joint.name].leader]) if joint.name in mimics else joint
+        _follower(joint, mimics[joint.name], by_name[mimics[joint.name].leader]) if joint.name in mimics else joint
         for joint in joints
     )
 
 
-def _following(joint: RobotJoint, mimic: Mimic, leader: RobotJoint) -> RobotJoint:
+def _follower(joint: RobotJoint, mimic: Mimic, leader: RobotJoint) -> RobotJoint:
     lower, upper = mimic.range_of(leader.lower, leader.upper)
-    effort = min(joint.effort, leader.effort / abs(mimic.multiplier))  # its power comes from the leader's drive
+    effort = min(joint.effort, leader.effort / abs(mimic.multiplier))  # the leading joint's drive supplies the power
     return replace(joint, mimic=mimic, lower=min(joint.lower, lower), upper=max(joint.upper, upper), effort=effort)
 
 
 def _set_limits(root: Element, joints: tuple[RobotJoint, ...]) -> None:
-    """Writes the limits of the mimic joints into the URDF."""
+    """Writes the limits of mimic joints into the URDF."""
     mimics = {joint.name: joint for joint in joints if joint.mimic is not None}
     for element in root.findall("joint"):
         joint, limit = mimics.get(element.get("name", "")), element.find("limit")
         if joint is not None and limit is not None:
-            limit.set("lower", repr(max(joint.lower, -FAR)))
-            limit.set("upper", repr(min(joint.upper, FAR)))
+            limit.set("lower", repr(max(joint.lower, -MAX_MIMIC_LIMIT)))
+            limit.set("upper", repr(min(joint.upper, MAX_MIMIC_LIMIT)))
 
 
 def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
-    """Returns the hardware interfaces that the transmissions name, by joint."""
+    """Returns the hardware interfaces of the transmissions, by joint name."""
     interfaces: dict[str, tuple[str, ...]] = {}
     for transmission in robot.transmissions:
         for joint in transmission.joints:
@@ -144,13 +144,15 @@ def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
                 where = (
                     f"robot_description:{joint.line}: <transmission name='{transmission.name}'>, joint '{joint.name}'"
                 )
-                raise DescriptionError(where, "has no <hardwareInterface>", "name the position, velocity or effort one")
+                raise DescriptionError(
+                    where, "has no <hardwareInterface>", "add a position, velocity or effort interface"
+                )
             interfaces[joint.name] = interfaces.get(joint.name, ()) + tuple(each.text for each in joint.interfaces)
     return interfaces
 
 
 def _simulated_joints(text: str, robot: Robot) -> list[Ros2ControlJoint]:
-    """Returns the joints of the `<ros2_control>` tags that name a simulation."""
+    """Returns the joints of `<ros2_control>` tags with simulated hardware."""
     try:
         tags = read_ros2_control(text)
     except xml_text.XmlError as error:
@@ -160,12 +162,12 @@ def _simulated_joints(text: str, robot: Robot) -> list[Ros2ControlJoint]:
     for joint in joints:
         if joint.name not in movable:
             where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
-            raise DescriptionError(where, "is no joint that moves", f"allowed: {', '.join(movable)}")
+            raise DescriptionError(where, "is not a movable joint", f"allowed: {', '.join(movable)}")
     return joints
 
 
 def _commands(joint: Ros2ControlJoint) -> tuple[str, ...]:
-    """Returns the hardware interfaces of ros_control for the command interfaces of a joint."""
+    """Converts the command interfaces of a joint to hardware interfaces of ros_control."""
     unknown = [name for name in joint.command_interfaces if name not in COMMAND_INTERFACES]
     if unknown:
         where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
@@ -174,7 +176,7 @@ def _commands(joint: Ros2ControlJoint) -> tuple[str, ...]:
     return tuple(COMMAND_INTERFACES[name] for name in joint.command_interfaces)
 
 
-def _require_ends(robot: Robot) -> None:
+def _require_parent_and_child(robot: Robot) -> None:
     for joint in robot.joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if not link:
@@ -237,14 +239,14 @@ def _rewrite_meshes(root: Element, find_package: PackageFinder, convex_parts: Co
 
 
 def _require_sizes(link: str, shape: Element) -> None:
-    """Refuses primitives that are larger than the engine can place to the millimetre."""
+    """Raises DescriptionError for a primitive shape too large for the engine's position accuracy of a millimetre."""
     for element in shape.findall("geometry/*"):
         for key, text in ((key, element.get(key)) for key in ("size", "radius", "length")):
             try:
-                largest = max((abs(float(word)) for word in (text or "").split()), default=0.0)
+                max_length = max((abs(float(word)) for word in (text or "").split()), default=0.0)
             except ValueError:
-                largest = math.inf
-            if not largest <= MAX_LENGTH_M:
+                max_length = math.inf
+            if not max_length <= MAX_LENGTH_M:
                 where = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
                 raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {MAX_LENGTH_M:g} m")
 

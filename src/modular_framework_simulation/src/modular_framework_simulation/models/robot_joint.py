@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A movable joint of a robot, as the simulation sees it."""
+"""Movable joint of a simulated robot."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from modular_framework_urdf.rotations import Vector3
 
 @dataclass(frozen=True, slots=True)
 class RobotJoint:
-    """A movable joint of the robot.
+    """Movable joint of a robot.
 
     Attributes:
-        name: As in the description.
-        parent_link: The link it is fastened to.
-        child_link: The link it moves.
-        axis: Direction in the frame of the child link.
-        lower: [rad or m]; of a mimic joint no higher than its leader brings it.
-        upper: [rad or m]; of a mimic joint no lower than its leader brings it.
-        effort: Largest effort of its drive [Nm or N]; of a mimic joint no more than its leader's drive gives it.
-        velocity: Largest velocity [rad/s or m/s].
-        interfaces: Hardware interfaces it is commanded by; empty for a joint without a drive of its own.
-        mimic: The joint it follows, if it follows one.
+        name: Name in the description.
+        parent_link: Name of the parent link.
+        child_link: Name of the child link.
+        axis: Axis direction in the frame of the child link.
+        lower: Lower limit [rad or m]; a mimic joint's limits include the range given by its leading joint.
+        upper: Upper limit [rad or m].
+        effort: Maximum effort of the drive [Nm or N]; for a mimic joint, limited by the leading joint's drive.
+        velocity: Maximum velocity [rad/s or m/s].
+        interfaces: Hardware interfaces for commands; empty for a joint without its own drive.
+        mimic: Relation of a mimic joint to its leading joint; None for other joints.
     """
 
     name: str
@@ -40,7 +40,7 @@ class RobotJoint:
 
 
 def gripper_joints(joints: Iterable[RobotJoint]) -> list[RobotJoint]:
-    """Returns the joints of all grippers: those that mimic, and those they follow."""
+    """Returns the joints of all grippers: mimic joints and their leading joints."""
     joints = list(joints)
     leaders = {joint.mimic.leader for joint in joints if joint.mimic is not None}
     return [joint for joint in joints if joint.mimic is not None or joint.name in leaders]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives the links of a robot what the engines need of inertia where the description leaves it out.
+"""Completes the inertia of robot links that the description leaves out.
 
-Gazebo leaves such links out, with all that hangs on them, unless a fixed joint joins them to another. The engines here
-would take 1 kg for a frame. So a link with collision shapes weighs what they weigh filled with water, which is what SDF
-takes for a link whose inertia is to be computed; a link without shapes is a frame and weighs next to nothing.
+Gazebo omits links without inertia, with all links below them, unless a fixed joint connects them to another link. The
+physics engines would assume 1 kg for a frame. Therefore, a link with collision shapes gets the mass properties of the
+shapes filled with water, SDF's default density; a link without shapes is a frame and gets a negligible mass.
 
-A URDF does not know the rotors of the drives either. Behind the gear of a gripper they are most of what a finger is as
-inertia: without them a motor of 5 N m turns a finger of 20 g at 1,000 rad/s after a step, and of that the contact with
-the object has to leave nothing.
+A URDF does not describe the rotors of the drives either. Behind the gear of a gripper, the rotor contributes most of a
+finger's inertia. Without a rotor, a motor of 5 N m accelerates a finger of 20 g to 1,000 rad/s within one step, and the
+contact with the object would have to absorb this velocity.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.rotations import Vector3, matrix_from_rpy
 from modular_framework_urdf.xml_text import Element
 
-_FRAME = specs.Inertial(Pose(), 1e-5, (1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
-SHORTEST_START_S = 2e-4
-"""Shortest time in which a gripper's joint reaches its full velocity with its full effort; servos take 5 ms or more."""
+_FRAME_INERTIAL = specs.Inertial(Pose(), 1e-5, (1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
+MIN_ACCELERATION_TIME_S = 2e-4
+"""Minimum time in which a gripper joint reaches its maximum velocity at full effort; servos take 5 ms or more."""
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -40,9 +40,9 @@ def give_masses(root: Element, robot: urdf.Robot, find_package: PackageFinder) -
     """Adds an <inertial> to every link without one.
 
     Args:
-        root: URDF whose meshes are still those of the description; changed.
+        root: URDF with the meshes of the description; changed in place.
         robot: The same description.
-        find_package: Looks up the packages of package:// URIs.
+        find_package: Function that finds the packages of package:// URIs.
 
     Raises:
         DescriptionError: A mesh cannot be read.
@@ -50,25 +50,29 @@ def give_masses(root: Element, robot: urdf.Robot, find_package: PackageFinder) -
     links = {link.name: link for link in robot.links}
     for element in root.findall("link"):
         if element.find("inertial") is None:
-            _add(element, _filled(links[element.get("name", "")], find_package) or _FRAME)
+            _add_inertial(element, _filled_shapes(links[element.get("name", "")], find_package) or _FRAME_INERTIAL)
 
 
 def give_rotors(root: Element, joints: Iterable[RobotJoint]) -> None:
-    """Raises the moments of inertia of links that a gripper's drive would accelerate faster than any drive does.
+    """Raises the moments of inertia of links that a gripper's drive would accelerate too fast for a real drive.
 
     Args:
-        root: URDF whose links have inertias; changed.
+        root: URDF whose links have inertias; changed in place.
         joints: Joints of the robot.
     """
-    turning = {item.get("name") for item in root.findall("joint") if item.get("type") in ("revolute", "continuous")}
+    revolute_joints = {
+        item.get("name") for item in root.findall("joint") if item.get("type") in ("revolute", "continuous")
+    }
     inertials = {link.get("name"): link.find("inertial") for link in root.findall("link")}
     for joint in gripper_joints(joints):
         inertial = inertials[joint.child_link]
-        if joint.name in turning and joint.velocity > 0.0 and inertial is not None:
-            lacking = joint.effort * SHORTEST_START_S / joint.velocity - _moment_about(joint.axis, inertial)
-            for key in ("ixx", "iyy", "izz") if lacking > 0.0 else ():
+        if joint.name in revolute_joints and joint.velocity > 0.0 and inertial is not None:
+            missing_moment = joint.effort * MIN_ACCELERATION_TIME_S / joint.velocity - _moment_about(
+                joint.axis, inertial
+            )
+            for key in ("ixx", "iyy", "izz") if missing_moment > 0.0 else ():
                 inertia = inertial.find("inertia")
-                inertia.set(key, repr(float(inertia.get(key, "0")) + lacking))
+                inertia.set(key, repr(float(inertia.get(key, "0")) + missing_moment))
 
 
 def _moment_about(axis: Vector3, inertial: Element) -> float:
@@ -78,13 +82,16 @@ def _moment_about(axis: Vector3, inertial: Element) -> float:
     roll, pitch, yaw = (float(word) for word in (origin.get("rpy", "0 0 0") if origin is not None else "0 0 0").split())
     xx, xy, xz, yy, yz, zz = (float(inertia.get(key, "0")) for key in _MOMENTS)
     direction = np.array(axis) / np.linalg.norm(axis)
-    turned = direction @ np.array(matrix_from_rpy(roll, pitch, yaw))
+    axis_in_inertial = direction @ np.array(matrix_from_rpy(roll, pitch, yaw))
     lever = np.cross(direction, centre)
     mass = float(inertial.find("mass").get("value"))
-    return float(turned @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turned + mass * lever @ lever)
+    return float(
+        axis_in_inertial @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ axis_in_inertial
+        + mass * lever @ lever
+    )
 
 
-def _filled(link: urdf.Link, find_package: PackageFinder) -> specs.Inertial | None:
+def _filled_shapes(link: urdf.Link, find_package: PackageFinder) -> specs.Inertial | None:
     """Returns the mass properties of the collision shapes of a link; None if they have no volume."""
     shapes = []
     for collision in link.collisions:
@@ -110,10 +117,10 @@ def _geometry(link: str, shape: urdf.Shape, find_package: PackageFinder) -> spec
             except MeshError as error:
                 where = f"robot_description: mesh of link '{link}'"
                 raise DescriptionError(where, error.found, error.allowed) from error
-    return None  # a shape that the engine refuses by itself
+    return None  # the engine refuses all other shapes
 
 
-def _add(link: Element, inertial: specs.Inertial) -> None:
+def _add_inertial(link: Element, inertial: specs.Inertial) -> None:
     element = xml_text.add_child(link, "inertial")
     xml_text.add_child(element, "origin", xyz=" ".join(map(repr, inertial.pose.position)))
     xml_text.add_child(element, "mass", value=repr(inertial.mass))

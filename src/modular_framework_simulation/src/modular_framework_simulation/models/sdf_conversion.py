@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Brings documents of SDF 1.0 into the form of 1.2, in which values are elements where they were attributes.
+"""Converts SDF 1.0 documents to SDF 1.2, in which child elements replace many attributes.
 
-The rules are those of sdformat's table for that step (1_0.convert), for what is read here.
+The rules follow sdformat's conversion table for this step (1_0.convert), restricted to the supported elements.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
 CONVERTED_VERSION = (1, 2)
-"""Older documents are converted to this version."""
+"""Version of a document after conversion."""
 
 _TO_CHILDREN: dict[str, tuple[str, ...]] = {
     "model": ("static",),
@@ -35,7 +35,7 @@ _TO_CHILDREN: dict[str, tuple[str, ...]] = {
     "dynamics": ("damping", "friction"),
     "limit": ("lower", "upper", "effort", "velocity", "cfm", "erp"),
 }
-"""Attributes that become children, by element."""
+"""Attributes that become child elements, by element tag."""
 
 _TO_TEXT: dict[str, tuple[str, str]] = {
     "origin": ("pose", "pose"),
@@ -47,13 +47,13 @@ _TO_TEXT: dict[str, tuple[str, str]] = {
     "specular": ("rgba", "specular"),
     "emissive": ("rgba", "emissive"),
 }
-"""The attribute that becomes the text of an element, and the new name of the element."""
+"""Attribute that becomes the text of an element, and new tag of the element."""
 
 
 def convert(root: XmlNode) -> None:
-    """Changes a document of an old version into one of `CONVERTED_VERSION`; elements keep their lines.
+    """Converts an older document to `CONVERTED_VERSION` in place; elements keep their line numbers.
 
-    Plugins stay as they are: what is in them is theirs.
+    Plugins are not changed, because their content does not belong to SDF.
     """
     root.attributes["version"] = ".".join(str(number) for number in CONVERTED_VERSION)
     _convert_below(root)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Resolves the frames of an SDF model: `<pose relative_to="...">` may chain through links, frames and inner models."""
+"""Resolves the frames of an SDF model; `<pose relative_to="...">` may chain through links, frames and inner models."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from modular_framework_simulation.models.sdf_specs import WORLD
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
 SCOPE = "::"
-"""Stands between the name of a model and that of what is in it."""
+"""Separator between the name of a model and the name of an element of the model."""
 
 MODEL_FRAME = "__model__"
 _FRAME_TAGS = ("link", "frame")
 
 
 def pose_of(node: XmlNode) -> Pose:
-    """Returns the pose an element's text gives: x y z [m] roll pitch yaw [rad]; an empty text is the identity.
+    """Parses an element's text as a pose: x y z [m] roll pitch yaw [rad]; an empty text is the identity.
 
-    The attributes `degrees` and `rotation_format` of SDF 1.9 are followed.
+    The attributes `degrees` and `rotation_format` of SDF 1.9 are supported.
 
     Raises:
-        DescriptionError: The text is not as many numbers as it needs to be.
+        DescriptionError: The text has the wrong number of values.
     """
     if not node.text.strip():
         return Pose()
@@ -47,18 +47,18 @@ def pose_of(node: XmlNode) -> Pose:
 
 
 def base_of(pose: XmlNode) -> str:
-    """Returns the name of the frame a pose is relative to; empty where it does not say."""
+    """Returns the name of the frame that a pose is relative to; empty if not specified."""
     return pose.attributes.get("relative_to", pose.attributes.get("frame", ""))
 
 
 @dataclass(frozen=True, slots=True)
 class InnerModel:
-    """A model inside another model, or in a world.
+    """Model inside another model or a world.
 
     Attributes:
-        frames: Its own frames.
-        pose: Where its `placement_frame` is; None for the origin of what holds it.
-        placement_frame: The frame of the model that the pose is of; empty for the frame of the model.
+        frames: Frames of the inner model.
+        pose: <pose> of the placement frame in the outer model; None for the origin.
+        placement_frame: Frame of the inner model at `pose`; empty for the model frame.
     """
 
     frames: FrameTree
@@ -67,12 +67,12 @@ class InnerModel:
 
 
 class FrameTree:
-    """The named frames of one model, or of a world.
+    """Named frames of a model or world.
 
     Args:
-        holder: The element of the model or world.
-        inner: The models in it, by name.
-        canonical_link: The link that `__model__` belongs to; empty where there is none.
+        holder: Element of the model or world.
+        inner: Inner models, by name.
+        canonical_link: Link that `__model__` is attached to; empty for a world.
     """
 
     def __init__(self, holder: XmlNode, inner: Mapping[str, InnerModel], canonical_link: str = "") -> None:
@@ -80,30 +80,30 @@ class FrameTree:
         self._inner = inner
         self._canonical_link = canonical_link
         named = [child for child in holder.children if child.attributes.get("name")]
-        # A joint may have the name of a link: then the name stands for the link.
+        # A joint may have the same name as a link; the name then refers to the link.
         self._joints = {child.attributes["name"]: child for child in named if child.tag == "joint"}
         self._nodes = {child.attributes["name"]: child for child in named if child.tag in _FRAME_TAGS}
 
     def refuse_circles(self) -> None:
-        """Refuses frames that are defined by each other in a circle, also those that nothing uses.
+        """Checks that no frames, used or unused, are defined by each other in a circle.
 
         Raises:
-            DescriptionError: Names the circle.
+            DescriptionError: The frames form a circle, which the text names.
         """
         for name in self._nodes:
             self.pose_in_model(name)
 
     def _base_of(self, pose: XmlNode) -> str:
-        """Returns the frame that a pose is relative to; the attribute `frame` of old files may name nothing."""
+        """Returns the base frame of a pose; empty if the attribute `frame` of an old file names an unknown frame."""
         base, outer = base_of(pose), base_of(pose).partition(SCOPE)[0]
         known = {"", MODEL_FRAME, *self._nodes, *self._joints, *self._inner}
         return base if "relative_to" in pose.attributes or outer in known else ""
 
     def pose_in_model(self, name: str) -> Pose:
-        """Returns the pose of a link, frame, joint or inner model in the frame of the model.
+        """Returns the pose of a link, frame, joint or inner model in the model frame.
 
         Args:
-            name: One of them, with "inner::" before it where it is in an inner model; empty for the model itself.
+            name: Name of the element, with the prefix "inner::" in an inner model; empty for the model.
 
         Raises:
             DescriptionError: The name is unknown, or the frames are defined by each other in a circle.
@@ -111,22 +111,22 @@ class FrameTree:
         return self._pose(name, ())
 
     def joint_pose_in_model(self, joint: XmlNode) -> Pose:
-        """Returns the pose of a joint in the model frame; by default that of its child."""
+        """Returns the pose of a joint in the model frame; the default is the pose of its child."""
         return self._pose_of_node(joint, ("joint " + joint.name(),))
 
     def placed(self, pose: XmlNode | None, base: str = "") -> Pose:
-        """Returns the pose an element gives, in the frame of the model.
+        """Returns the pose of an element in the model frame.
 
         Args:
-            pose: The <pose>; None for the identity.
-            base: The frame it is relative to where it does not say itself.
+            pose: The <pose> element; None for the identity.
+            base: Base frame of a pose without its own base frame.
         """
         if pose is None:
             return self.pose_in_model(base)
         return self.pose_in_model(self._base_of(pose) or base) @ pose_of(pose)
 
     def pose_in_link(self, link: str, pose: XmlNode | None) -> Pose:
-        """Returns the pose of something in a link, in the frame of the link."""
+        """Returns the pose of a link's child element in the link frame."""
         if pose is None:
             return Pose()
         base = self._base_of(pose)
@@ -135,20 +135,20 @@ class FrameTree:
         return self.pose_in_model(link).inverse() @ self.placed(pose)
 
     def link_of(self, node: XmlNode) -> str:
-        """Returns the link that the <parent> or <child> of a joint means; frames and models stand for theirs.
+        """Returns the link that a joint's <parent> or <child> refers to, also through frames and models.
 
         Raises:
-            DescriptionError: It names nothing that has a link.
+            DescriptionError: The name does not refer to a link.
         """
         name = node.text.strip()
         if name == WORLD:
             return WORLD
         link = self._link(name, ())
         prefix = self._holder.attributes.get("name", "") + SCOPE
-        if link is None and name.startswith(prefix):  # old files write the name of the model before it
+        if link is None and name.startswith(prefix):  # old files add the model's name as a prefix
             link = self._link(name.removeprefix(prefix), ())
         if link is None:
-            raise DescriptionError(node.where, f"'{name}' is no link", f"allowed: {', '.join(self._links())}")
+            raise DescriptionError(node.where, f"'{name}' is not a link", f"allowed: {', '.join(self._links())}")
         return link
 
     def _links(self) -> list[str]:
@@ -157,7 +157,7 @@ class FrameTree:
         return own + inner
 
     def _link(self, name: str, visited: tuple[str, ...]) -> str | None:
-        """Returns the link a frame is attached to, None where there is none of that name."""
+        """Returns the link that a frame is attached to; None for an unknown name."""
         if name in visited:
             raise DescriptionError(self._holder.where, f"'{name}' is attached to itself", "break the circle")
         if name in ("", MODEL_FRAME):
@@ -181,7 +181,7 @@ class FrameTree:
             return Pose()
         if name in visited:
             circle = " -> ".join([*visited, name])
-            raise DescriptionError(self._where(name), f"its pose depends on itself ({circle})", "break the circle")
+            raise DescriptionError(self._where(name), f"the pose depends on itself ({circle})", "break the circle")
         if name in self._inner:
             return self._pose_of_inner(self._inner[name], (*visited, name))
         inner, separator, rest = name.partition(SCOPE)
@@ -202,7 +202,7 @@ class FrameTree:
         base = self._base_of(pose) if pose is not None else ""
         if not base and node.tag == "joint":
             base = node.require("child").text.strip()
-            if base not in self._nodes and base not in self._inner:  # perhaps with the name of the model before it
+            if base not in self._nodes and base not in self._inner:  # the name may have the model's name as a prefix
                 base = self._link_named(node.require("child"))
         elif not base and node.tag == "frame":
             base = node.attributes.get("attached_to", "")

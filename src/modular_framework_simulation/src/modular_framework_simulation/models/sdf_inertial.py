@@ -22,30 +22,32 @@ WATER_KG_PER_M3 = 1000.0
 
 _DEFAULT_MASS_KG, _DEFAULT_MOMENT = 1.0, 1.0
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_ROUNDING = 1e-3
-"""Share by which moments that were rounded when written may break the triangle inequality."""
+_ROUNDING_TOLERANCE = 1e-3
+"""Fraction by which rounded moments may violate the triangle inequality."""
 
 
 def read_inertial(
     link: XmlNode, frames: FrameTree, collisions: tuple[specs.Collision, ...], notes: Notes
 ) -> specs.Inertial:
-    """Reads the <inertial> of a link that can move; what is not given has SDF's defaults.
+    """Reads the <inertial> of a movable link; missing values have SDF's defaults.
 
     Args:
-        link: The <link>.
-        frames: Of its model.
-        collisions: Its shapes, from which moments that are zero are computed.
-        notes: Takes what was replaced.
+        link: The <link> element.
+        frames: Frames of the model.
+        collisions: Collision shapes of the link, used to compute moments that are zero.
+        notes: Collector of notes on replaced values.
 
     Raises:
         DescriptionError: The mass is not positive.
     """
     node = link.find("inertial")
     if node is None:
-        notes.add(link, f"has no <inertial>: {_DEFAULT_MASS_KG:g} kg and {_DEFAULT_MOMENT:g} kg m^2, as SDF defines")
+        notes.add(
+            link, f"has no <inertial>; SDF's default is used: {_DEFAULT_MASS_KG:g} kg and {_DEFAULT_MOMENT:g} kg m^2"
+        )
         return specs.Inertial(frames.pose_in_link(link.name(), None), _DEFAULT_MASS_KG, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
     if node.attributes.get("auto", "false").strip().lower() in ("true", "1"):
-        return _computed(node, link, collisions)
+        return _computed_from_shapes(node, link, collisions)
     mass_node, inertia_node = node.find("mass"), node.find("inertia")
     mass = mass_node.number() if mass_node is not None else _DEFAULT_MASS_KG
     if mass <= 0:
@@ -57,43 +59,47 @@ def read_inertial(
 
     xx, xy, xz, yy, yz, zz = (moment(tag) for tag in _MOMENTS)
     pose = frames.pose_in_link(link.name(), node.find("pose"))
-    read = specs.Inertial(pose, mass, (xx, xy, xz, yy, yz, zz))
-    return usable(read, collisions, inertia_node or node, notes)
+    given = specs.Inertial(pose, mass, (xx, xy, xz, yy, yz, zz))
+    return with_valid_inertia(given, collisions, inertia_node or node, notes)
 
 
-def usable(
+def with_valid_inertia(
     inertial: specs.Inertial, collisions: tuple[specs.Collision, ...], node: XmlNode, notes: Notes
 ) -> specs.Inertial:
-    """Returns mass properties that a body can move with, and notes what was wrong with the given ones.
+    """Returns mass properties that the engine can simulate, and adds a note on invalid values.
 
     Args:
-        inertial: As given.
-        collisions: Shapes of the link.
-        node: The element the moments stand in.
-        notes: Takes what was replaced.
+        inertial: Given mass properties.
+        collisions: Collision shapes of the link.
+        node: Element of the moments.
+        notes: Collector of notes on replaced values.
     """
     moments = principal_moments(inertial.inertia)
-    given = "its principal moments are {:g}, {:g}, {:g} kg m^2".format(*moments)
+    problem = "the principal moments are {:g}, {:g}, {:g} kg m^2".format(*moments)
     if moments[0] > 0:
-        if is_impossible(moments, _ROUNDING):
-            notes.add(node, f"{given}: no rigid body has such moments, they are used as they are")
+        if is_impossible(moments, _ROUNDING_TOLERANCE):
+            notes.add(node, f"{problem}; no rigid body has these moments, but they are used unchanged")
         return inertial
     solid = inertial_of_shapes([(shape, WATER_KG_PER_M3) for shape in collisions])
     if solid is None:
-        notes.add(node, f"{given}: {_DEFAULT_MOMENT:g} kg m^2 are used instead, as there is no shape to compute them")
+        notes.add(
+            node, f"{problem}; {_DEFAULT_MOMENT:g} kg m^2 is used instead, as the link has no solid collision shape"
+        )
         return specs.Inertial(inertial.pose, inertial.mass, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
     filled = with_mass(solid, inertial.mass)
-    notes.add(node, f"{given}: those of its collision shapes, filled with {inertial.mass:g} kg, are used instead")
+    notes.add(
+        node, f"{problem}; the moments of its collision shapes with a mass of {inertial.mass:g} kg are used instead"
+    )
     return specs.Inertial(Pose(inertial.pose.position), inertial.mass, filled.inertia)
 
 
-def _computed(node: XmlNode, link: XmlNode, collisions: tuple[specs.Collision, ...]) -> specs.Inertial:
-    """Returns the mass properties of the shapes of a link, which SDF 1.11 lets a file ask for."""
+def _computed_from_shapes(node: XmlNode, link: XmlNode, collisions: tuple[specs.Collision, ...]) -> specs.Inertial:
+    """Computes the mass properties of the shapes of a link, as SDF 1.11 allows a file to request."""
     default = non_negative(node, "density") or WATER_KG_PER_M3
     densities = {child.name(): non_negative(child, "density") or default for child in link.find_all("collision")}
     solid = inertial_of_shapes([(shape, _density_of(shape.name, densities, default)) for shape in collisions])
     if solid is None:
-        raise DescriptionError(node.where, "is to be computed", "needs a <collision> that has a volume")
+        raise DescriptionError(node.where, "has auto='true'", "a <collision> with a volume is required")
     return solid
 
 

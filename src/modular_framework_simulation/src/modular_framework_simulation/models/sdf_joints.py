@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the joints of an SDF model, whose axes are written in frames that differ from version to version."""
+"""Reads the joints of an SDF model; the frame of a joint axis depends on the SDF version."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ Version = tuple[int, ...]
 _WITHOUT_AXIS = (specs.JointType.FIXED, specs.JointType.BALL)
 
 _AXIS_IN_MODEL_FRAME_UNTIL: Version = (1, 4)
-"""Until this version an axis is given in the frame of the model, later in that of the joint."""
+"""Last version with axes in the model frame; later versions use the joint frame."""
 _AXIS_EXPRESSED_IN_FROM: Version = (1, 7)
-"""From this version an attribute names the frame of an axis; before it a child element chose the model's."""
+"""First version with an attribute for the frame of an axis; older versions have a child element."""
 
 
 def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Joint:
     """Reads a <joint>.
 
     Args:
-        node: The element.
-        frames: Of the model.
-        version: Of SDF, of the file.
+        node: The <joint> element.
+        frames: Frames of the model.
+        version: SDF version of the file.
 
     Raises:
-        DescriptionError: The joint is of a kind that is not simulated, or something in it cannot be used.
+        DescriptionError: The joint type is not simulated, or the joint has invalid content.
     """
     kind = node.choice("type", specs.JointType, "joint type")
     child_node = node.require("child")
     parent, child = frames.link_of(node.require("parent")), frames.link_of(child_node)
     if child == specs.WORLD:
         if kind is not specs.JointType.FIXED:
-            allowed = "allowed: the world as the parent of a joint that moves; exchange <parent> and <child>"
+            allowed = "allowed: the world as the parent of a movable joint; exchange <parent> and <child>"
             raise DescriptionError(child_node.where, "is the world", allowed)
         return _without_axis(node, kind, specs.WORLD, parent, Pose())
     joint_in_model = frames.joint_pose_in_model(node)
@@ -54,7 +54,7 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
     if lower > upper:
         where = (axis_node.find("limit") or axis_node).where
         raise DescriptionError(
-            where, f"got lower {lower:g} and upper {upper:g}", "allowed: a lower one below the upper"
+            where, f"got lower {lower:g} and upper {upper:g}", "allowed: a lower limit below the upper limit"
         )
     return specs.Joint(
         node.name(),
@@ -78,21 +78,21 @@ def _without_axis(node: XmlNode, kind: specs.JointType, parent: str, child: str,
 
 
 def _axis_in_joint(node: XmlNode, joint_in_model: Pose, frames: FrameTree, version: Version) -> Vector3:
-    """Returns the unit vector of an axis in the frame of its joint."""
+    """Returns the unit vector of an axis in the joint frame."""
     xyz = node.find("xyz")
     x, y, z = xyz.numbers(3) if xyz is not None else (0.0, 0.0, 1.0)
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
         raise DescriptionError((xyz or node).where, "got an axis of length 0", "expected a direction")
     axis = (x / length, y / length, z / length)
-    written_in = _frame_of_axis(node, frames, version)
-    if written_in is None:
+    axis_frame = _frame_of_axis(node, frames, version)
+    if axis_frame is None:
         return axis
-    return rotate_vector(joint_in_model.inverse().quaternion, rotate_vector(written_in.quaternion, axis))
+    return rotate_vector(joint_in_model.inverse().quaternion, rotate_vector(axis_frame.quaternion, axis))
 
 
 def _frame_of_axis(node: XmlNode, frames: FrameTree, version: Version) -> Pose | None:
-    """Returns the pose in the model of the frame an axis is written in; None for the frame of the joint."""
+    """Returns the pose of an axis's reference frame in the model frame; None for the joint frame."""
     if version <= _AXIS_IN_MODEL_FRAME_UNTIL:
         return Pose()
     if version < _AXIS_EXPRESSED_IN_FROM:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the models of SDF documents, with the models inside them and the documents they include."""
+"""Reads the models of SDF documents, including nested models and included documents."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from modular_framework_simulation.models.sensor_elements import sdf_sensor_eleme
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 
 _MAX_DEPTH = 16
-_MOST_MODELS = 10_000
-"""Of one world: files that include each other many times over would otherwise fill the memory."""
+_MAX_MODELS = 10_000
+"""Maximum number of models of a world; files that include each other repeatedly would otherwise exhaust the memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedModel:
-    """A model as its element describes it.
+    """Model read from an element.
 
     Attributes:
-        spec: The model; its pose is not set yet, as it may be relative to what stands beside it.
-        placed: Its frames and its pose.
+        spec: The model, without its pose, which may be relative to a sibling of the element.
+        placed: Frames and <pose> of the model.
     """
 
     spec: specs.Model
@@ -39,26 +39,28 @@ class LoadedModel:
 
 
 def sdf_version(root: XmlNode) -> tuple[int, ...]:
-    """Returns the version of a document.
+    """Returns the SDF version of a document.
 
     Raises:
-        DescriptionError: It is no SDF, or of a version that is not read.
+        DescriptionError: The document is not SDF, or has an unsupported version.
     """
-    span = f"{_text(OLDEST_VERSION)} to {_text(NEWEST_VERSION)}"
+    supported = f"{_text(OLDEST_VERSION)} to {_text(NEWEST_VERSION)}"
     if root.tag not in ("sdf", "gazebo"):
-        raise DescriptionError(root.where, f"the root element is <{root.tag}>", f"allowed: <sdf version='...'>, {span}")
+        raise DescriptionError(
+            root.where, f"the root element is <{root.tag}>", f"allowed: <sdf version='...'>, {supported}"
+        )
     text = root.attributes.get("version", "")
     version = version_numbers(text)
     if not OLDEST_VERSION <= version <= NEWEST_VERSION:
-        raise DescriptionError(root.where, f"got version '{text}'", f"allowed: {span}")
+        raise DescriptionError(root.where, f"got version '{text}'", f"allowed: {supported}")
     return version
 
 
 def converted_version(root: XmlNode) -> tuple[int, ...]:
-    """Returns the version of a document, after converting it if it is of one before the oldest that is read as it is.
+    """Returns the SDF version of a document, after converting a document older than `CONVERTED_VERSION`.
 
     Raises:
-        DescriptionError: It is no SDF, or of a version that is not read.
+        DescriptionError: The document is not SDF, or has an unsupported version.
     """
     version = sdf_version(root)
     if version < CONVERTED_VERSION:
@@ -72,10 +74,10 @@ def _text(version: tuple[int, ...]) -> str:
 
 
 class SdfModels:
-    """Reads models; one instance reads everything of one world or one request.
+    """Reader of models, used for a single world or request.
 
     Args:
-        resources: Where included models and meshes are found.
+        resources: Folders and packages for included models and meshes.
     """
 
     def __init__(self, resources: Resources) -> None:
@@ -87,15 +89,15 @@ class SdfModels:
         """Reads the first model of a document.
 
         Args:
-            root: Its root element.
-            depth: How many models and includes it is in.
-            static: What overrides the <static> of the model.
+            root: Root element of the document.
+            depth: Nesting depth of models and includes.
+            static: Value that overrides the model's <static>; None to keep it.
 
         Returns:
-            None where the document holds only a light or an actor, which have no body.
+            The model; None if the document contains only a light or an actor, which have no body.
 
         Raises:
-            DescriptionError: It holds nothing at all, or something that cannot be used.
+            DescriptionError: The document has no content, or unsupported or invalid content.
         """
         version = converted_version(root)
         holder = root.find("world") or root
@@ -107,18 +109,26 @@ class SdfModels:
             return self.included(include, depth, static)
         if root.find("light") is not None or root.find("actor") is not None:
             return None
-        raise DescriptionError(root.where, "holds no <model>", "one <model> or <include> is needed")
+        raise DescriptionError(root.where, "contains no <model>", "a <model> or <include> is required")
 
     def included(self, node: XmlNode, depth: int, static: bool | None = None) -> LoadedModel | None:
-        """Reads the model that an <include> names, with the name, pose and static of the <include>.
+        """Reads the model of an <include>, and applies the name, pose and static of the <include>.
+
+        Args:
+            node: The <include> element.
+            depth: Nesting depth of models and includes.
+            static: Value that overrides the model's <static>; None to keep it.
+
+        Returns:
+            The model; None if the included document contains only a light or an actor.
 
         Raises:
-            DescriptionError: There is no such model, or something in it cannot be used.
+            DescriptionError: The model does not exist, or has unsupported or invalid content.
         """
         self._require_shallow(node, depth)
         if node.attributes.get("merge", "false").strip().lower() in ("true", "1"):
             raise DescriptionError(
-                node.where, "asks for merge='true'", "allowed: includes that stay models; flatten it"
+                node.where, "has merge='true'", "allowed: an <include> without merge; copy the model's content"
             )
         uri = node.require("uri").text.strip()
         own_static = node.find("static")
@@ -141,20 +151,20 @@ class SdfModels:
         """Reads a <model>.
 
         Args:
-            node: The element.
-            version: Of SDF, of its document.
-            depth: How many models and includes it is in.
-            static: What overrides its <static>.
+            node: The <model> element.
+            version: SDF version of the document.
+            depth: Nesting depth of models and includes.
+            static: Value that overrides the model's <static>; None to keep it.
 
         Raises:
-            DescriptionError: Something in it cannot be used.
+            DescriptionError: The model has unsupported or invalid content.
         """
         self._require_shallow(node, depth)
         static_node = node.find("static")
         if static is None:
             static = static_node.flag() if static_node is not None else False
         reading = Reading(self._resources, version)
-        reading.notes.read_over(node)
+        reading.notes.note_unsupported(node)
         inner = self._inner_models(node, version, depth, True if static else None)
         own_links = node.find_all("link")
         canonical = node.attributes.get("canonical_link") or next((link.name() for link in own_links), "")
@@ -164,12 +174,12 @@ class SdfModels:
         joints = [read_joint(joint, frames, version) for joint in node.find_all("joint")]
         sensors = list(sdf_sensor_elements(node, frames))
         for name, each in inner.items():
-            _add_inner(name, each.spec, frames.pose_in_model(name), links, joints, fasten=not static)
+            _add_inner(name, each.spec, frames.pose_in_model(name), links, joints, fix_to_world=not static)
             reading.notes.add_lines(each.spec.notes)
             sensors += [_scoped_sensor(sensor, name) for sensor in each.spec.sensors]
         if not links:
             raise DescriptionError(node.where, "has no <link>", "a model needs at least one")
-        _refuse_repeated(own_links + node.find_all("joint"))
+        _refuse_duplicates(own_links + node.find_all("joint"))
         self_collide = node.find("self_collide")
         spec = specs.Model(
             name=node.name(),
@@ -197,7 +207,9 @@ class SdfModels:
             if loaded is None:
                 continue
             if loaded.spec.name in inner:
-                raise DescriptionError(child.where, f"is a second model '{loaded.spec.name}'", "give each its own name")
+                raise DescriptionError(
+                    child.where, f"is a second model '{loaded.spec.name}'", "give each model its own name"
+                )
             inner[loaded.spec.name] = loaded
         return inner
 
@@ -208,10 +220,12 @@ class SdfModels:
 
     def _require_shallow(self, node: XmlNode, depth: int) -> None:
         if depth >= _MAX_DEPTH:
-            raise DescriptionError(node.where, f"is the model number {depth + 1} inside each other", "break the circle")
+            raise DescriptionError(
+                node.where, f"has the nesting depth {depth + 1}", f"allowed: {_MAX_DEPTH}; break the circle of includes"
+            )
         self._models += node.tag == "model"
-        if self._models > _MOST_MODELS:
-            raise DescriptionError(node.where, f"is the model number {self._models:,}", f"allowed: {_MOST_MODELS:,}")
+        if self._models > _MAX_MODELS:
+            raise DescriptionError(node.where, f"is model number {self._models:,}", f"allowed: {_MAX_MODELS:,}")
 
 
 def _read_link(node: XmlNode, frames: FrameTree, static: bool, reading: Reading) -> specs.Link:
@@ -236,16 +250,16 @@ def _read_link(node: XmlNode, frames: FrameTree, static: bool, reading: Reading)
 
 
 def _add_inner(
-    name: str, inner: specs.Model, pose: Pose, links: list[specs.Link], joints: list[specs.Joint], fasten: bool
+    name: str, inner: specs.Model, pose: Pose, links: list[specs.Link], joints: list[specs.Joint], fix_to_world: bool
 ) -> None:
-    """Adds links and joints of an inner model to those of the outer one."""
+    """Adds the links and joints of an inner model to the links and joints of the outer model."""
 
     def scoped(link: str) -> str:
         return link if link == specs.WORLD else f"{name}{SCOPE}{link}"
 
     for link in inner.links:
         links.append(dataclasses.replace(link, name=scoped(link.name), pose=pose @ link.pose))
-        if inner.static and fasten:
+        if inner.static and fix_to_world:
             joints.append(
                 specs.Joint(
                     f"{scoped(link.name)}{SCOPE}static",
@@ -264,15 +278,15 @@ def _add_inner(
 
 
 def _scoped_sensor(sensor: specs.SensorElement, inner: str) -> specs.SensorElement:
-    """Returns a sensor of an inner model as one of the outer model."""
+    """Returns an inner model's sensor as a sensor of the outer model."""
     link, joint = (f"{inner}{SCOPE}{name}" if name else "" for name in (sensor.link, sensor.joint))
     return dataclasses.replace(sensor, link=link, joint=joint, scope=f"{inner}{SCOPE}{sensor.scope}")
 
 
-def _refuse_repeated(nodes: list[XmlNode]) -> None:
+def _refuse_duplicates(nodes: list[XmlNode]) -> None:
     seen: set[tuple[str, str]] = set()
     for node in nodes:
         key = (node.tag, node.name())
         if key in seen:
-            raise DescriptionError(node.where, f"is not the only {node.tag} of that name", "give each its own name")
+            raise DescriptionError(node.where, f"has the name of another {node.tag}", "give each its own name")
         seen.add(key)

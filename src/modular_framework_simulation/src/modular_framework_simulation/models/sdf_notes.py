@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collects what of a model has no effect here or was replaced, so that nothing is dropped without a word."""
+"""Collects notes on elements of a model that have no effect or are replaced, so that nothing is ignored silently."""
 
 from __future__ import annotations
 
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
-_READ: dict[str, tuple[str, ...]] = {
+_SUPPORTED_CHILDREN: dict[str, tuple[str, ...]] = {
     "model": ("pose", "static", "link", "joint", "frame", "model", "include", "self_collide", "plugin"),
     "include": ("uri", "name", "pose", "static", "placement_frame"),
     "link": (
@@ -29,16 +29,16 @@ _READ: dict[str, tuple[str, ...]] = {
     "axis/limit": ("lower", "upper", "effort", "velocity"),
     "axis/dynamics": ("damping", "friction", "spring_reference", "spring_stiffness"),
 }
-"""What is read below an element: a path of one or two tags, and its children."""
+"""Supported children of an element; the key is the element's tag, or its parent's tag and its own tag."""
 
-_OF_NO_ACCOUNT = frozenset(
+_IRRELEVANT = frozenset(
     {"specular", "emissive", "shininess", "lighting", "shader", "cast_shadows", "laser_retro", "max_contacts", "meta"}
 )
-"""Of the look of things and of limits of other engines: not worth a line."""
+"""Elements that only affect the appearance or the limits of other engines; no note is added."""
 
 
 class Notes:
-    """Lines about one model, in the order in which they were found; each kind of element is named once."""
+    """Lines about one model in the order of discovery, with one line per kind of element."""
 
     def __init__(self) -> None:
         self._lines: dict[str, str] = {}
@@ -47,9 +47,9 @@ class Notes:
         """Adds a line about an element.
 
         Args:
-            node: The element.
-            text: What about it.
-            kind: Further lines of the same kind are left out; by default only those that are equal.
+            node: Element of the note.
+            text: Text of the note.
+            kind: Kind of the note; later notes of the same kind are dropped. By default, only equal lines are dropped.
         """
         line = f"{node.where}: {text}"
         self._lines.setdefault(kind or line, line)
@@ -59,22 +59,22 @@ class Notes:
         for line in lines:
             self._lines.setdefault(line, line)
 
-    def read_over(self, node: XmlNode) -> None:
-        """Names what is below an element and is not read; models and includes in it are left to their own notes."""
-        self._read_over(node, _READ[node.tag], node.tag)
+    def note_unsupported(self, node: XmlNode) -> None:
+        """Adds a note for each unsupported element below a node; inner models and includes have their own notes."""
+        self._note_unsupported(node, _SUPPORTED_CHILDREN[node.tag], node.tag)
 
-    def _read_over(self, node: XmlNode, read: tuple[str, ...], path: str) -> None:
+    def _note_unsupported(self, node: XmlNode, supported: tuple[str, ...], path: str) -> None:
         for child in node.children:
-            if child.tag in _OF_NO_ACCOUNT:
+            if child.tag in _IRRELEVANT:
                 continue
-            if child.tag not in read:
-                self.add(child, "has no effect here", f"<{node.tag}>/<{child.tag}>")
+            if child.tag not in supported:
+                self.add(child, "has no effect", f"<{node.tag}>/<{child.tag}>")
                 continue
-            below = _READ.get(f"{path}/{child.tag}") or _READ.get(child.tag)
-            if below is not None and child.tag not in ("model", "include"):
-                self._read_over(child, below, child.tag)
+            grandchildren = _SUPPORTED_CHILDREN.get(f"{path}/{child.tag}") or _SUPPORTED_CHILDREN.get(child.tag)
+            if grandchildren is not None and child.tag not in ("model", "include"):
+                self._note_unsupported(child, grandchildren, child.tag)
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """All lines."""
+        """Returns all lines."""
         return tuple(self._lines.values())

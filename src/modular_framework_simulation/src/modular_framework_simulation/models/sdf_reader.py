@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads worlds and models written in SDF 1.0 to 1.11.
+"""Reads worlds and models in SDF 1.0 to 1.11.
 
-What is read: includes, poses in all frames, models inside models, links with inertia, shapes, looks, surfaces and
-damping, and fixed, revolute, continuous and prismatic joints. What an element means is taken from the version of its
-own file. Sensors and plugins are passed on as they are. Elements that have no effect here (lights, settings of other
-engines) are listed once a model; what would make a wrong world, such as a joint of another kind, is refused.
+Supported elements are includes, poses in all frames, models inside models, links with inertia, shapes, materials,
+surfaces and damping, and fixed, revolute, continuous, prismatic and ball joints. The version of each file determines
+the meaning of its elements. Sensors and plugins are returned unchanged. Elements without effect, such as lights and
+settings of other engines, are listed once per model. Elements that would make the world wrong, such as unsupported
+joints, raise errors.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.8)
 """SDF's default gravity [m/s^2]."""
 
 _GRAVITY_IN_PHYSICS_UNTIL = (1, 5)
-"""Until this version <gravity> is a child of <physics>, later of <world>."""
+"""Last version with <gravity> as a child of <physics>; later versions have <gravity> in <world>."""
 
-_NAMES_UNIQUE_FROM = (1, 7)
-"""Until then files with several models of one name were read: the later ones get a number, as Gazebo gives them."""
+_UNIQUE_NAMES_FROM = (1, 7)
+"""First version with unique model names; in older files, duplicate models get a numbered name, as in Gazebo."""
 
 _REFUSED_IN_WORLD = {
-    "population": "place its models one by one",
-    "joint": "put the joint into a model that holds both",
+    "population": "place the models individually",
+    "joint": "move the joint into a model that contains both links",
 }
 
 
@@ -43,14 +44,14 @@ def read_world(path: Path, resources: Resources) -> specs.World:
     """Reads a .world file.
 
     Args:
-        path: The file.
-        resources: Where included models and meshes are found.
+        path: Path of the file.
+        resources: Folders and packages for included models and meshes.
 
     Returns:
-        The world with every include resolved.
+        The world with all includes resolved.
 
     Raises:
-        DescriptionError: Something in the file, or in a file it includes, cannot be used.
+        DescriptionError: The file or an included file has unsupported or invalid content.
     """
     root = read_xml(path)
     version = converted_version(root)
@@ -75,7 +76,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
 def _models_of(
     world: XmlNode, version: tuple[int, ...], resources: Resources
 ) -> tuple[dict[str, LoadedModel], list[str]]:
-    """Returns the models of a world by name, and what else is in it that has no effect."""
+    """Returns the models of a world by name, and the lines of elements without effect."""
     reader = SdfModels(resources)
     loaded: dict[str, LoadedModel] = {}
     ignored: list[str] = []
@@ -86,10 +87,12 @@ def _models_of(
         elif child.tag == "model":
             model = reader.model(child, version, 0)
         elif child.tag in _REFUSED_IN_WORLD:
-            raise DescriptionError(child.where, "is not simulated", _REFUSED_IN_WORLD[child.tag])
+            raise DescriptionError(child.where, "is not supported", _REFUSED_IN_WORLD[child.tag])
         if model is not None:
-            if model.spec.name in loaded and version >= _NAMES_UNIQUE_FROM:
-                raise DescriptionError(child.where, f"is a second model '{model.spec.name}'", "give each its own name")
+            if model.spec.name in loaded and version >= _UNIQUE_NAMES_FROM:
+                raise DescriptionError(
+                    child.where, f"is a second model '{model.spec.name}'", "give each model its own name"
+                )
             model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
         elif child.tag not in ("gravity", "frame", "state", "physics", "light", "scene", "gui"):
@@ -97,31 +100,31 @@ def _models_of(
     return loaded, ignored
 
 
-def _with_free_name(model: LoadedModel, taken: Collection[str], where: str) -> LoadedModel:
-    """Returns a model with a number behind its name and a note of that, if its name is taken."""
+def _with_free_name(model: LoadedModel, used_names: Collection[str], where: str) -> LoadedModel:
+    """Returns the model; if its name is in use, with a numbered name and a note."""
     name = model.spec.name
-    if name not in taken:
+    if name not in used_names:
         return model
-    free = next(numbered for number in itertools.count() if (numbered := f"{name}_{number}") not in taken)
-    notes = (*model.spec.notes, f"{where}: is a second model '{name}', and is called '{free}'")
-    return dataclasses.replace(model, spec=dataclasses.replace(model.spec, name=free, notes=notes))
+    free_name = next(numbered for number in itertools.count() if (numbered := f"{name}_{number}") not in used_names)
+    notes = (*model.spec.notes, f"{where}: is a second model '{name}'; the model is renamed to '{free_name}'")
+    return dataclasses.replace(model, spec=dataclasses.replace(model.spec, name=free_name, notes=notes))
 
 
 def read_model_text(text: str, source: str, resources: Resources) -> specs.Model:
-    """Reads a model from text, for instance from a spawn request.
+    """Reads a model from text, for example from a spawn request.
 
     Args:
-        text: The SDF.
-        source: What to call the text in messages.
-        resources: Where included models and meshes are found.
+        text: SDF text.
+        source: Name of the text in messages.
+        resources: Folders and packages for included models and meshes.
 
     Raises:
-        DescriptionError: Something in it cannot be used.
+        DescriptionError: The text has unsupported or invalid content.
     """
     root = parse_xml(text, source)
     loaded = SdfModels(resources).in_document(root)
     if loaded is None:
-        raise DescriptionError(root.where, "holds a light or an actor only", "a <model> is needed: neither has a body")
+        raise DescriptionError(root.where, "contains only a light or an actor, which have no body", "add a <model>")
     refuse_loops(loaded.spec)
     placed = FrameTree(root.find("world") or root, {loaded.spec.name: loaded.placed})
     return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name))

@@ -14,28 +14,28 @@ from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 from modular_framework_urdf.mesh_paths import PackageFinder
 
 MODEL_PATH, RESOURCE_PATH = "GAZEBO_MODEL_PATH", "GAZEBO_RESOURCE_PATH"
-"""Environment variables with folders, separated by colons, as Gazebo reads them."""
+"""Environment variables that list folders, separated by colons, as in Gazebo."""
 
-_MOST_NAMED = 4
-"""Folders that a message names."""
+_MAX_LISTED_FOLDERS = 4
+"""Maximum number of folders in a message."""
 
 NEWEST_VERSION = (1, 11)
 OLDEST_VERSION = (1, 0)
 
 
 def no_packages(name: str) -> str:
-    """Finds nothing: the lookup for an environment without ROS packages."""
-    raise LookupError(f"package '{name}' cannot be looked up here")
+    """Raises LookupError for every package, in an environment without ROS packages."""
+    raise LookupError(f"package '{name}' cannot be looked up without ROS packages")
 
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """The folders and packages that URIs refer to.
+    """Folders and packages that URIs refer to.
 
     Attributes:
-        model_folders: Folders holding one folder a model, searched in order.
-        find_package: Looks up ROS packages for package:// URIs.
-        resource_folders: Folders that relative file:// URIs start at, beside that of the file they stand in.
+        model_folders: Folders with one subfolder per model, in search order.
+        find_package: Function that finds ROS packages for package:// URIs.
+        resource_folders: Base folders of relative file:// URIs, searched after the folder of the referring file.
     """
 
     model_folders: tuple[Path, ...] = ()
@@ -47,23 +47,23 @@ class Resources:
 
         Args:
             node: Element the URI was read from; relative paths start at its file.
-            uri: model://, package://, file:// or a path; of a model of Gazebo Fuel the name counts.
+            uri: A model://, package:// or file:// URI, a path, or the URL of a Gazebo Fuel model (found by its name).
 
         Raises:
             DescriptionError: The URI has another scheme or leads nowhere.
         """
         scheme, separator, rest = uri.partition("://")
         if not separator:
-            candidates = self._relative(node, uri)
+            candidates = self._relative_candidates(node, uri)
         elif scheme == "file":
-            candidates = self._relative(node, rest)
+            candidates = self._relative_candidates(node, rest)
         elif scheme == "model":
             rest = rest.lstrip("/")
             candidates = [folder / rest for folder in self.model_folders]
         elif scheme == "package":
             candidates = [self._in_package(node, rest)]
         elif scheme in ("http", "https") and "/models/" in rest:
-            candidates = self._downloaded(rest)
+            candidates = self._fuel_candidates(rest)
         else:
             raise DescriptionError(
                 node.where, f"got URI '{uri}'", "allowed: model://, package://, file:// or a path relative to the file"
@@ -71,20 +71,20 @@ class Resources:
         for candidate in candidates:
             if (rest if separator else uri) and candidate.exists():
                 return candidate
-        looked_in = ", ".join(str(candidate) for candidate in candidates[:_MOST_NAMED])
-        if len(candidates) > _MOST_NAMED:
-            looked_in += f" and in {len(candidates) - _MOST_NAMED} more folders"
-        looked_in = looked_in or "nowhere: no model folder is known"
-        ways = f"set gazebo_model_path or {MODEL_PATH}"
-        raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {ways}")
+        looked_in = ", ".join(str(candidate) for candidate in candidates[:_MAX_LISTED_FOLDERS])
+        if len(candidates) > _MAX_LISTED_FOLDERS:
+            looked_in += f" and in {len(candidates) - _MAX_LISTED_FOLDERS} more folders"
+        looked_in = looked_in or "no folder, because no model folder is set"
+        advice = f"set gazebo_model_path or {MODEL_PATH}"
+        raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {advice}")
 
-    def _downloaded(self, address: str) -> list[Path]:
-        """Returns where a model of Gazebo Fuel may be: nothing is fetched, a model of its name has to be there."""
+    def _fuel_candidates(self, address: str) -> list[Path]:
+        """Returns the local candidates of a Gazebo Fuel model, which is not downloaded."""
         name = unquote(address.partition("/models/")[2]).split("/")[0]
         names = dict.fromkeys((name, name.lower().replace(" ", "_")))
         return [folder / each for folder in self.model_folders for each in names]
 
-    def _relative(self, node: XmlNode, path: str) -> list[Path]:
+    def _relative_candidates(self, node: XmlNode, path: str) -> list[Path]:
         if Path(path).is_absolute():
             return [Path(path)]
         return [folder / path for folder in (Path(node.source).parent, *self.resource_folders)]
@@ -93,43 +93,43 @@ class Resources:
         package, _, relative = rest.partition("/")
         try:
             return Path(self.find_package(package)) / relative
-        except Exception as error:  # the finder is the caller's: whatever it raises means "not there"
+        except Exception as error:  # the caller's function may raise anything for a missing package
             raise DescriptionError(node.where, f"package '{package}' is not found ({error})", "install it") from error
 
     def model_file(self, node: XmlNode, uri: str) -> Path:
-        """Returns the SDF file of an included model: a file itself, or what the folder's model.config names.
+        """Returns the SDF file of an included model; a URI of a folder refers to the file in its model.config.
 
         Raises:
-            DescriptionError: There is no such model or its model.config names no file that exists.
+            DescriptionError: The model does not exist, or its model.config does not name an existing file.
         """
         path = self.resolve(node, uri)
         if path.is_file():
             return path
         if not (path / "model.config").is_file() and not (path / "model.sdf").is_file():
-            raise DescriptionError(node.where, f"'{path}' holds no model", "a model folder needs a model.config")
+            raise DescriptionError(node.where, f"'{path}' contains no model", "a model folder needs a model.config")
         return model_file(path)
 
 
 def model_file(folder: Path) -> Path:
-    """Returns the SDF file of a model's folder: what its model.config names, or model.sdf without one.
+    """Returns the SDF file of a model folder: the file in its model.config, or model.sdf without a model.config.
 
     Raises:
-        DescriptionError: The model.config names no file that exists.
+        DescriptionError: The model.config does not name an existing file.
     """
-    config, usual = folder / "model.config", folder / "model.sdf"
+    config, default_file = folder / "model.config", folder / "model.sdf"
     if not config.is_file():
-        return usual
+        return default_file
     try:
         root = read_xml(config)
     except DescriptionError:
-        if usual.is_file():  # an author's address in brackets is the usual fault, and of no account
-            return usual
+        if default_file.is_file():  # the usual fault is an author's e-mail address in angle brackets
+            return default_file
         raise
     return _newest_file(config, root)
 
 
 def _newest_file(config: Path, root: XmlNode) -> Path:
-    """Returns the file of the newest version of SDF that is read here, of those a model.config names."""
+    """Returns the file with the newest supported SDF version in a model.config."""
     entries = root.find_all("sdf")
     if not entries:
         raise DescriptionError(root.where, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")
@@ -146,21 +146,21 @@ def _version_of(entry: XmlNode) -> tuple[int, ...]:
 
 
 def version_numbers(text: str) -> tuple[int, ...]:
-    """Returns "1.6" as (1, 6); what is no number counts as 0."""
+    """Returns the numbers of a version, (1, 6) for "1.6"; parts that are not numbers are 0."""
     return tuple(int(part) if part.isdigit() else 0 for part in text.strip().split("."))
 
 
 def folders_of(environment: Mapping[str, str], variable: str) -> tuple[Path, ...]:
-    """Returns the folders an environment variable lists."""
+    """Returns the folders in an environment variable."""
     return tuple(Path(entry).expanduser() for entry in environment.get(variable, "").split(os.pathsep) if entry)
 
 
 def model_folders(first: Iterable[Path], environment: Mapping[str, str]) -> tuple[Path, ...]:
-    """Returns where models are looked for: given folders, those of GAZEBO_MODEL_PATH, and ~/.gazebo/models.
+    """Returns the search path of models: the given folders, the folders in GAZEBO_MODEL_PATH, and ~/.gazebo/models.
 
     Args:
-        first: Folders that come before.
-        environment: Of the process.
+        first: Folders that are searched first.
+        environment: Environment variables of the process.
     """
     home = Path(environment.get("HOME", "/")) / ".gazebo" / "models"
     return (*first, *folders_of(environment, MODEL_PATH), *([home] if home.is_dir() else []))

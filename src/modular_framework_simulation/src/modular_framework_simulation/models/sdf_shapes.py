@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the shapes of an SDF link: what it touches with, and what of it is seen."""
+"""Reads the collision shapes and visible shapes of an SDF link."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from modular_framework_simulation.models.sdf_frames import FrameTree
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_surface import read_bounce, read_friction, read_surface_contact
-from modular_framework_simulation.models.visual_meshes import missing_pictures
+from modular_framework_simulation.models.visual_meshes import missing_images
 from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
@@ -25,12 +25,12 @@ _MESH_SUFFIXES = tuple(f".{kind}" for kind in MESH_FORMATS)
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What one model is read with.
+    """Context for reading a model.
 
     Attributes:
-        resources: Where included models and meshes are found.
-        version: Of SDF, of the file.
-        notes: Takes what has no effect or is replaced.
+        resources: Folders and packages for included models and meshes.
+        version: SDF version of the file.
+        notes: Collector of notes on elements that have no effect or are replaced.
     """
 
     resources: Resources
@@ -39,25 +39,37 @@ class Reading:
 
 
 def read_collisions(node: XmlNode, link: str, frames: FrameTree, reading: Reading) -> list[specs.Collision]:
-    """Reads a <collision>: mostly one shape, none where it is empty, three for a capsule.
+    """Reads a <collision>, which has one shape in general, no shape if empty, and three shapes for a capsule.
+
+    Args:
+        node: The <collision> element.
+        link: Name of the link.
+        frames: Frames of the model.
+        reading: Context of the model.
 
     Raises:
-        DescriptionError: Its shape, pose or surface cannot be used.
+        DescriptionError: The shape, pose or surface is unsupported or invalid.
     """
     name = node.name()
     friction, bounce, contact = read_friction(node), read_bounce(node), read_surface_contact(node)
     pose = frames.pose_in_link(link, node.find("pose"))
     return [
-        specs.Collision(name if not number else f"{name}_{number}", pose @ offset, shape, friction, bounce, contact)
-        for number, (offset, shape) in enumerate(_read_geometry(node.require("geometry"), reading.resources))
+        specs.Collision(name if not index else f"{name}_{index}", pose @ offset, shape, friction, bounce, contact)
+        for index, (offset, shape) in enumerate(_read_geometry(node.require("geometry"), reading.resources))
     ]
 
 
 def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) -> list[specs.Visual]:
-    """Reads a <visual>; one whose mesh or material is not there is left out, or grey, with a note.
+    """Reads a <visual>; a shape without mesh file is omitted, and a shape without material is grey, with a note.
+
+    Args:
+        node: The <visual> element.
+        link: Name of the link.
+        frames: Frames of the model.
+        reading: Context of the model.
 
     Raises:
-        DescriptionError: Its shape, pose or colour cannot be used.
+        DescriptionError: The shape, pose or colour is unsupported or invalid.
     """
     name = node.name()
     try:
@@ -67,9 +79,9 @@ def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) 
         return []
     material = _read_material(node, reading)
     for shape in (shape for _, shape in shapes if isinstance(shape, specs.Mesh) and material is None):
-        for picture in missing_pictures(shape.path):
+        for image in missing_images(shape.path):
             reading.notes.add(
-                node, f"the picture '{picture}' of {shape.path.name} is not there: drawn without", picture
+                node, f"the image '{image}' of {shape.path.name} does not exist; drawn without a texture", image
             )
     transparency = node.find("transparency")
     look = material or Material()
@@ -79,19 +91,19 @@ def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) 
     pose = frames.pose_in_link(link, node.find("pose"))
     return [
         specs.Visual(
-            name if not number else f"{name}_{number}",
+            name if not index else f"{name}_{index}",
             pose @ offset,
             shape,
             (red, green, blue, alpha),
             look.texture,
             material is None and isinstance(shape, specs.Mesh),
         )
-        for number, (offset, shape) in enumerate(shapes)
+        for index, (offset, shape) in enumerate(shapes)
     ]
 
 
 def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
-    """Returns the material of a visual, None where it has none of its own."""
+    """Returns the material of a visual; None if the visual has no material."""
     node = visual.find("material")
     if node is None:
         return None
@@ -101,10 +113,10 @@ def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
         try:
             named = script_material(script, reading.resources)
         except DescriptionError as error:
-            reading.notes.add(script, f"{error.problem}: drawn grey ({error.allowed})")
+            reading.notes.add(script, f"{error.problem}; drawn grey ({error.allowed})")
             named = Material()
         if named.missing_texture:
-            reading.notes.add(script, f"the picture '{named.missing_texture}' is not there: drawn in a plain colour")
+            reading.notes.add(script, f"the image '{named.missing_texture}' does not exist; drawn in a plain colour")
     if colour_node is None:
         return named
     red, green, blue, *alpha = colour_node.number_list(3, 4)
@@ -113,16 +125,16 @@ def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
 
 
 class MissingMeshError(DescriptionError):
-    """The file of a mesh is not there."""
+    """The file of a mesh does not exist."""
 
 
 def _read_geometry(node: XmlNode, resources: Resources) -> list[tuple[Pose, specs.Geometry]]:
-    """Returns the shapes of a <geometry> with their poses in it."""
+    """Returns the shapes of a <geometry> and the pose of each shape in the geometry's frame."""
     if node.find("empty") is not None and len(node.children) == 1:
         return []
     if len(node.children) != 1 or node.children[0].tag not in _GEOMETRIES:
         got = ", ".join(f"<{child.tag}>" for child in node.children) or "nothing"
-        raise DescriptionError(node.where, f"holds {got}", f"allowed: exactly one of {', '.join(_GEOMETRIES)}")
+        raise DescriptionError(node.where, f"contains {got}", f"allowed: exactly one of {', '.join(_GEOMETRIES)}")
     shape = node.children[0]
     match shape.tag:
         case "box":
@@ -139,11 +151,11 @@ def _read_geometry(node: XmlNode, resources: Resources) -> list[tuple[Pose, spec
             return [(Pose(), _read_plane(shape))]
         case "mesh":
             return [(Pose(), _read_mesh(shape, resources))]
-    raise DescriptionError(shape.where, "is no known shape", f"allowed: {', '.join(_GEOMETRIES)}")
+    raise DescriptionError(shape.where, "is not a known shape", f"allowed: {', '.join(_GEOMETRIES)}")
 
 
 def _capsule(radius: float, length: float) -> list[tuple[Pose, specs.Geometry]]:
-    """Returns a cylinder with a ball at both ends, which together are the capsule."""
+    """Returns the shapes of a capsule: a cylinder with a sphere at each end."""
     ends = (Pose((0.0, 0.0, length / 2)), Pose((0.0, 0.0, -length / 2)))
     return [(Pose(), specs.Cylinder(radius, length)), *((end, specs.Sphere(radius)) for end in ends)]
 
@@ -159,7 +171,7 @@ def _read_plane(node: XmlNode) -> specs.Plane:
 
 
 def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
-    uri = node.find("uri") or node.find("filename") or node.require("uri")  # <filename> until SDF 1.3
+    uri = node.find("uri") or node.find("filename") or node.require("uri")  # <filename> up to SDF 1.3
     try:
         path = resources.resolve(uri, uri.text.strip())
     except DescriptionError as error:
@@ -169,7 +181,7 @@ def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
     scale = node.find("scale")
     x, y, z = scale.numbers(3) if scale is not None else (1.0, 1.0, 1.0)
     if scale is not None and not all((x, y, z)):
-        raise DescriptionError(scale.where, f"got '{scale.text.strip()}'", "allowed: numbers other than 0")
+        raise DescriptionError(scale.where, f"got '{scale.text.strip()}'", "allowed: numbers different from 0")
     submesh = node.find("submesh")
     if submesh is None:
         return specs.Mesh(path, (x, y, z))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The contents of a world or model file, as plain values."""
+"""Plain values for the contents of world and model files."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from modular_framework_urdf.robot import Sphere as Sphere
 from modular_framework_urdf.rotations import Vector3
 
 WORLD = "world"
-"""The name that joints use for the world as their parent."""
+"""Name of the world as a parent of joints."""
 
 UNLIMITED_FRICTION = 1e6
-"""Stands for a coefficient of -1, with which Gazebo means that surfaces never slide."""
+"""Coefficient that replaces Gazebo's -1, which stands for surfaces that never slide."""
 
 Colour = tuple[float, float, float, float]
 """RGBA in [0, 1]."""
 
 GREY: Colour = (0.7, 0.7, 0.7, 1.0)
-"""What has no material."""
+"""Colour of shapes without a material."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """An infinite plane through its frame's origin.
+    """Infinite plane through the origin of its frame.
 
     Attributes:
-        normal: Unit vector out of the solid half-space.
-        size: Edge lengths to draw [m]; collisions are infinite.
+        normal: Unit normal, pointing out of the solid half-space.
+        size: Edge lengths of the drawn rectangle [m]; the collision shape is infinite.
     """
 
     normal: Vector3
@@ -43,12 +43,12 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A triangle mesh file (stl, obj, ply or dae), or a part of one.
+    """Triangle mesh file (stl, obj, ply or dae), or a part of the file.
 
     Attributes:
-        path: The file.
-        scale: Along each axis.
-        submesh: Name of the only node of the file to take; empty for all of them.
+        path: Path of the file.
+        scale: Scale factors along x, y, z.
+        submesh: Name of the only node to use; empty for all nodes.
         center: Whether the submesh is moved so that its bounding box is centred on the origin.
     """
 
@@ -59,7 +59,7 @@ class Mesh:
 
 
 class JointType(Enum):
-    """The joints a simulated model may have."""
+    """Joint types of a simulated model."""
 
     FIXED = "fixed"
     REVOLUTE = "revolute"
@@ -73,13 +73,13 @@ Geometry = Box | Cylinder | Sphere | Plane | Mesh
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Coulomb friction coefficients of a surface.
+    """Friction coefficients of a surface; None if the file does not give a value.
 
     Attributes:
-        lateral: Resistance against sliding (`mu`), dimensionless.
-        torsional: Resistance against spinning about the contact normal [m], None when the file does not say.
-        rolling: Resistance against rolling [m], None when the file does not say.
-        mu2: Resistance against sliding across the first direction, None when the file does not say.
+        lateral: Coulomb coefficient of sliding friction (`mu`), dimensionless.
+        torsional: Resistance against spinning about the contact normal [m].
+        rolling: Resistance against rolling [m].
+        mu2: Coulomb coefficient of sliding friction in the second direction, dimensionless.
     """
 
     lateral: float = 1.0
@@ -90,11 +90,11 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class Bounce:
-    """How a surface throws back what hits it.
+    """Bounce of a surface.
 
     Attributes:
-        restitution_coefficient: 0 (no bounce) to 1 (no loss).
-        threshold: Slower impacts do not bounce [m/s].
+        restitution_coefficient: Coefficient of restitution, 0 (no bounce) to 1 (no loss).
+        threshold: Minimum impact velocity for a bounce [m/s].
     """
 
     restitution_coefficient: float = 0.0
@@ -103,15 +103,15 @@ class Bounce:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceContact:
-    """How a surface gives way, None where the file does not say.
+    """Contact properties of a surface; None if the file does not give a value.
 
     Attributes:
         kp: Stiffness [N/m].
         kd: Damping [N s/m].
-        max_vel: Largest velocity with which a penetration is corrected [m/s].
-        min_depth: Penetration that is left as it is [m].
-        collide_without_contact: Whether the shape only reports touches, and lets everything pass.
-        collide_bitmask: Shapes touch where their masks share a bit.
+        max_vel: Maximum velocity of the penetration correction [m/s].
+        min_depth: Penetration that is not corrected [m].
+        collide_without_contact: Whether the shape only reports contacts, without contact forces.
+        collide_bitmask: Bit mask; two shapes collide if their masks have a common bit.
     """
 
     kp: float | None = None
@@ -124,7 +124,7 @@ class SurfaceContact:
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """One collision shape of a link; the pose is in the link frame."""
+    """Collision shape of a link, with its pose in the link frame."""
 
     name: str
     pose: Pose
@@ -136,14 +136,14 @@ class Collision:
 
 @dataclass(frozen=True, slots=True)
 class Visual:
-    """One visible shape of a link.
+    """Visible shape of a link.
 
     Attributes:
-        name: As in the file.
-        pose: In the link frame.
+        name: Name in the file.
+        pose: Pose in the link frame.
         geometry: The shape.
-        colour: Of the whole shape; where the file gives a mesh no colour, that of a part without a material of its own.
-        texture: Image file drawn on the shape.
+        colour: Colour of the shape; with `own_materials`, the colour of the parts without a material.
+        texture: Image file of the texture; None for a plain colour.
         own_materials: Whether a mesh is drawn with the materials of its own file.
     """
 
@@ -161,7 +161,7 @@ class Inertial:
 
     Attributes:
         pose: Centre of mass and inertia axes in the link frame.
-        mass: [kg]
+        mass: Mass [kg].
         inertia: ixx, ixy, ixz, iyy, iyz, izz about the centre of mass [kg m^2].
     """
 
@@ -172,7 +172,7 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class VelocityDecay:
-    """Share of its velocity that a link loses in every step of Gazebo, of 1 ms by default."""
+    """Fraction of the velocity that a link loses in every step of Gazebo, which is 1 ms by default."""
 
     linear: float = 0.0
     angular: float = 0.0
@@ -180,18 +180,18 @@ class VelocityDecay:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A rigid body of a model.
+    """Rigid body of a model.
 
     Attributes:
-        name: Unique in the model; "inner::link" for a link of a model inside the model.
-        pose: In the model frame.
-        inertial: None: 1 kg and moments of 1 kg m^2, as SDF defines.
-        collisions: In file order.
-        visuals: In file order.
-        velocity_decay: Damping of its motion.
-        gravity: Whether gravity acts on it.
-        kinematic: Whether forces do not move it.
-        self_collide: Whether it touches other links of its model; None: as the model says.
+        name: Unique name in the model; "inner::link" for a link of an inner model.
+        pose: Pose in the model frame.
+        inertial: Mass properties; None for SDF's default of 1 kg and moments of 1 kg m^2.
+        collisions: Collision shapes, in file order.
+        visuals: Visible shapes, in file order.
+        velocity_decay: Damping of the motion.
+        gravity: Whether gravity acts on the link.
+        kinematic: Whether forces do not move the link.
+        self_collide: Whether the link collides with other links of its model; None for the model's setting.
     """
 
     name: str
@@ -210,10 +210,10 @@ class JointDynamics:
     """Passive forces of a joint.
 
     Attributes:
-        damping: [N m s/rad or N s/m]
+        damping: Viscous damping [N m s/rad or N s/m].
         friction: Static friction [N m or N].
-        spring_reference: Position where the spring is at rest [rad or m].
-        spring_stiffness: [N m/rad or N/m]
+        spring_reference: Equilibrium position of the spring [rad or m].
+        spring_stiffness: Spring stiffness [N m/rad or N/m].
     """
 
     damping: float = 0.0
@@ -224,21 +224,21 @@ class JointDynamics:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint between two links of a model.
+    """Joint between two links of a model.
 
     Attributes:
-        name: Unique in the model.
-        kind: What the joint lets move.
+        name: Unique name in the model.
+        kind: Type of the joint.
         parent: Name of the parent link, or "world".
         child: Name of the child link.
-        pose: Joint frame in the child link frame.
-        axis: Unit vector in the joint frame.
+        pose: Pose of the joint frame in the child link frame.
+        axis: Unit vector of the axis in the joint frame.
         lower: Lower limit [rad or m].
         upper: Upper limit [rad or m].
-        effort: Largest effort of a drive [N m or N].
-        velocity: Largest velocity [rad/s or m/s].
+        effort: Maximum effort of a drive [N m or N].
+        velocity: Maximum velocity [rad/s or m/s].
         dynamics: Passive forces.
-        where: File, line and element of its description.
+        where: File, line and element of the description.
     """
 
     name: str
@@ -257,15 +257,15 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class SensorElement:
-    """A <sensor>, or a <plugin> of a model, which may be one, as the file has it.
+    """A <sensor> element, or a <plugin> element of a model that may be a sensor.
 
     Attributes:
         node: The element.
-        link: The link it is in, or the child of its joint; empty for a <plugin>.
-        joint: The joint it is in; empty for one in a link.
-        pose: In the frame of the link; None: as its own <pose> says.
-        reference: What the <gazebo> of a URDF around it refers to.
-        scope: "inner::" for one of an inner model, whose names its own are below.
+        link: Name of the link, or of the child link of the joint; empty for a <plugin>.
+        joint: Name of the joint; empty for a sensor of a link.
+        pose: Pose in the link frame; None if the element's own <pose> applies.
+        reference: Attribute `reference` of the enclosing <gazebo> element of a URDF.
+        scope: Prefix "inner::" of names in an inner model; empty for the outer model.
     """
 
     node: XmlNode
@@ -278,19 +278,19 @@ class SensorElement:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A named set of links.
+    """Named set of links.
 
     Attributes:
-        name: Instance name in the world.
-        pose: Model frame in the world frame.
-        static: Never moves.
-        links: In file order, those of inner models last; the first is the canonical link.
-        joints: In file order.
+        name: Name of the model in the world.
+        pose: Pose of the model frame in the world frame.
+        static: Whether the model never moves.
+        links: Links in file order, followed by links of inner models; the first link is the canonical link.
+        joints: Joints in file order.
         source: File (or other origin) of the description.
-        self_collide: Whether its links touch each other, unless a link says otherwise.
-        notes: What has no effect here or was replaced, each as "file:line: what".
+        self_collide: Whether the links collide with each other, unless a link has its own setting.
+        notes: Notes on elements that have no effect or are replaced, as "file:line: text".
         sensors: Elements that are or may be sensors.
-        namespace: Of the topics of its sensors, where they name none.
+        namespace: Default namespace of the sensors' topics.
     """
 
     name: str
@@ -307,14 +307,14 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A world file.
+    """Contents of a world file.
 
     Attributes:
         name: Name of the world.
-        gravity: [m/s^2]
-        models: In file order.
-        ignored: Elements that were read over, each as "file:line: <element>"; not those of the look of the world.
-        step_s: Physics step that the file asks for [s]; None: none.
+        gravity: Gravity vector in the world frame [m/s^2].
+        models: Models in file order.
+        ignored: Ignored elements, as "file:line: <element>", without elements of the world's appearance.
+        step_s: Physics step of the file [s]; None if the file has none.
     """
 
     name: str

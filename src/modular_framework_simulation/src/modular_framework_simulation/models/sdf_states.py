@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Applies the <state> of a saved world: where its models were when it was saved."""
+"""Applies the <state> of a saved world: the model poses at the time of saving."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_frames import pose_of
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
-_SAME_M, _SAME_RAD = 1e-3, 1e-3
-"""Saved poses are rounded: closer than this, a link is where its model has it."""
+_TOLERANCE_M, _TOLERANCE_RAD = 1e-3, 1e-3
+"""Tolerances of saved poses, which are rounded; a link within the tolerances has not moved."""
 
 
 def with_saved_state(models: list[specs.Model], state: XmlNode | None) -> list[specs.Model]:
-    """Returns models at the poses of a <state>.
+    """Returns the models at the poses of a <state>.
 
     Args:
-        models: Of the world.
-        state: Its <state>; None where it has none.
+        models: Models of the world.
+        state: The <state> element; None if the world has none.
 
     Raises:
-        DescriptionError: The state adds or removes models, or a pose cannot be read.
+        DescriptionError: The state adds or removes models, or a pose is invalid.
     """
     if state is None:
         return models
     for tag in ("insertions", "deletions"):
         change = state.find(tag)
         if change is not None and change.children:
-            raise DescriptionError(change.where, "changes what is in the world", "allowed: a saved world without it")
+            raise DescriptionError(change.where, "adds or removes models", "allowed: a saved world without changes")
     saved = {node.attributes.get("name", ""): node for node in state.find_all("model")}
     return [_restored(model, saved[model.name]) if model.name in saved else model for model in models]
 
@@ -49,10 +49,10 @@ def _restored(model: specs.Model, saved: XmlNode) -> specs.Model:
             continue
         in_model = pose.inverse() @ pose_of(node)
         distance, angle = in_model.distance_to(link.pose)
-        if distance > _SAME_M or angle > _SAME_RAD:
+        if distance > _TOLERANCE_M or angle > _TOLERANCE_RAD:
             moved[link.name] = in_model
     if moved and model.joints:
-        notes.append(f"{saved.where}: the saved positions of its joints have no effect here, they start at 0")
+        notes.append(f"{saved.where}: the saved joint positions have no effect; the joints start at 0")
         moved = {}
     links = tuple(dataclasses.replace(link, pose=moved.get(link.name, link.pose)) for link in model.links)
     return dataclasses.replace(model, pose=pose, links=links, notes=tuple(notes))

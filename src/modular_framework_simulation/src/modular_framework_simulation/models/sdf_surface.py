@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads how surfaces, links and joints resist: friction, bounce, contact, damping."""
+"""Reads friction, bounce, contact and damping of surfaces, links and joints."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from modular_framework_simulation.models.xml_nodes import XmlNode
 
 
 def non_negative(node: XmlNode | None, *path: str) -> float | None:
-    """Returns the number at a path below an element, None if there is none.
+    """Returns the number at a path below an element; None if no element is at the path.
 
     Raises:
-        DescriptionError: It is negative.
+        DescriptionError: The number is negative.
     """
     child = node.find_path(*path) if node is not None else None
     if child is None:
@@ -26,7 +26,7 @@ def non_negative(node: XmlNode | None, *path: str) -> float | None:
 
 
 def friction_coefficient(value: float | None) -> float | None:
-    """Returns a coefficient of friction; a negative one means in Gazebo that surfaces never slide."""
+    """Returns a friction coefficient; a negative value, Gazebo's sign of surfaces that never slide, is replaced."""
     return specs.UNLIMITED_FRICTION if value is not None and value < 0 else value
 
 
@@ -34,7 +34,7 @@ def read_friction(collision: XmlNode) -> specs.Friction:
     """Reads the friction of a <collision>.
 
     Raises:
-        DescriptionError: A coefficient is no number, or negative where that means nothing.
+        DescriptionError: A coefficient is not a number, or is negative and not a sliding coefficient.
     """
     friction = collision.find_path("surface", "friction")
 
@@ -60,7 +60,7 @@ def read_bounce(collision: XmlNode) -> specs.Bounce:
     """Reads the bounce of a <collision>.
 
     Raises:
-        DescriptionError: The coefficient is not from 0 to 1, or the threshold is negative.
+        DescriptionError: The coefficient is not between 0 and 1, or the threshold is negative.
     """
     bounce = collision.find_path("surface", "bounce")
     default = specs.Bounce()
@@ -76,22 +76,24 @@ def read_bounce(collision: XmlNode) -> specs.Bounce:
 
 
 def read_surface_contact(collision: XmlNode) -> specs.SurfaceContact:
-    """Reads the contact of a <collision>; what only one engine has is that of the Open Dynamics Engine.
+    """Reads the contact of a <collision>, using the settings of the Open Dynamics Engine.
 
     Raises:
-        DescriptionError: A value is negative, or no number.
+        DescriptionError: A value is negative or not a number.
     """
     contact = collision.find_path("surface", "contact")
-    largest_node = contact.find_path("ode", "max_vel") if contact is not None else None
-    largest = largest_node.number() if largest_node is not None else None  # negative: none
-    without = contact.find("collide_without_contact") if contact is not None else None
+    max_velocity_node = contact.find_path("ode", "max_vel") if contact is not None else None
+    max_velocity = (
+        max_velocity_node.number() if max_velocity_node is not None else None
+    )  # a negative value stands for no limit
+    without_contact = contact.find("collide_without_contact") if contact is not None else None
     mask = contact.find("collide_bitmask") if contact is not None else None
     return specs.SurfaceContact(
         non_negative(contact, "ode", "kp"),
         non_negative(contact, "ode", "kd"),
-        largest if largest is None or largest >= 0 else None,
+        max_velocity if max_velocity is None or max_velocity >= 0 else None,
         non_negative(contact, "ode", "min_depth"),
-        without.flag() if without is not None else False,
+        without_contact.flag() if without_contact is not None else False,
         specs.SurfaceContact().collide_bitmask if mask is None else _bitmask(mask),
     )
 
@@ -111,7 +113,7 @@ def read_velocity_decay(link: XmlNode) -> specs.VelocityDecay:
     """Reads the damping of a <link>.
 
     Raises:
-        DescriptionError: A value is negative, or no number.
+        DescriptionError: A value is negative or not a number.
     """
     decay = link.find("velocity_decay")
     return specs.VelocityDecay(non_negative(decay, "linear") or 0.0, non_negative(decay, "angular") or 0.0)
@@ -121,7 +123,7 @@ def read_joint_dynamics(axis: XmlNode) -> specs.JointDynamics:
     """Reads damping, friction and spring of the <axis> of a joint.
 
     Raises:
-        DescriptionError: A value is negative that must not be, or no number.
+        DescriptionError: A value that must not be negative is negative, or a value is not a number.
     """
     dynamics = axis.find("dynamics")
     reference = dynamics.find("spring_reference") if dynamics is not None else None
@@ -134,10 +136,15 @@ def read_joint_dynamics(axis: XmlNode) -> specs.JointDynamics:
 
 
 def joint_bound(axis: XmlNode, name: str, unlimited: float) -> float:
-    """Returns a number of the <limit> of an axis; from 1e16 on, and where there is none, it is `unlimited`.
+    """Returns a number of the <limit> of an axis; `unlimited` if the number is missing or at least 1e16.
+
+    Args:
+        axis: The <axis> element.
+        name: Tag of the limit.
+        unlimited: Value that stands for no limit: -inf or inf.
 
     Raises:
-        DescriptionError: It is no number.
+        DescriptionError: The limit is not a number.
     """
     node = axis.find_path("limit", name)
     if node is None:
@@ -151,14 +158,14 @@ def joint_bound(axis: XmlNode, name: str, unlimited: float) -> float:
 
 
 def drive_bound(axis: XmlNode, name: str) -> float:
-    """Returns the <effort> or <velocity> of the limits of an axis; a negative one means none.
+    """Returns the <effort> or <velocity> limit of an axis; infinite for a negative value.
 
     Raises:
-        DescriptionError: It is no number.
+        DescriptionError: The limit is not a number.
     """
     value = joint_bound(axis, name, math.inf)
     return math.inf if value < 0 else value
 
 
 _NO_LIMIT = 1e16
-"""SDF's default of the limits of a joint."""
+"""Magnitude of SDF's default joint limits."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the elements of a description that are or may be sensors; what they mean is read elsewhere.
+"""Finds the elements of a description that are or may be sensors; `sensors/` interprets the elements.
 
-In SDF a `<sensor>` is in a link or in a joint, in URDF in a `<gazebo reference="...">`. A `<plugin>` of the model may
-be a sensor too.
+An SDF `<sensor>` is the child of a link or joint, a URDF `<sensor>` is the child of a `<gazebo reference="...">`. A
+`<plugin>` of the model may also be a sensor.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from modular_framework_simulation.models.xml_nodes import XmlNode
 
 
 def sdf_sensor_elements(model: XmlNode, frames: FrameTree) -> tuple[SensorElement, ...]:
-    """Returns the sensors of an SDF model, those of inner models left out.
+    """Returns the sensor elements of an SDF model, without those of inner models.
 
     Args:
-        model: The <model>.
-        frames: Its frames.
+        model: The <model> element.
+        frames: Frames of the model.
 
     Raises:
-        DescriptionError: The frame that the pose of one is relative to is unknown.
+        DescriptionError: The pose of a sensor is relative to an unknown frame.
     """
     elements = []
     for link in model.find_all("link"):
         name = link.name()
         for node in link.find_all("sensor"):
             pose = node.find("pose")
-            elsewhere = pose is not None and base_of(pose) not in ("", name)
-            elements.append(SensorElement(node, name, pose=frames.pose_in_link(name, pose) if elsewhere else None))
+            in_other_frame = pose is not None and base_of(pose) not in ("", name)
+            elements.append(SensorElement(node, name, pose=frames.pose_in_link(name, pose) if in_other_frame else None))
     for joint in model.find_all("joint"):
         for node in joint.find_all("sensor"):
             elements.append(SensorElement(node, frames.link_of(joint.require("child")), joint.name()))
@@ -36,10 +36,10 @@ def sdf_sensor_elements(model: XmlNode, frames: FrameTree) -> tuple[SensorElemen
 
 
 def urdf_sensor_elements(robot: XmlNode) -> tuple[SensorElement, ...]:
-    """Returns the sensors of a URDF; one that refers to nothing has no link.
+    """Returns the sensor elements of a URDF; a sensor without a reference has no link.
 
     Args:
-        robot: The root element.
+        robot: Root element.
     """
     links = {node.attributes.get("name", "") for node in robot.find_all("link")}
     children = {

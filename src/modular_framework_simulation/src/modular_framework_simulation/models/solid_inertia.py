@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes the mass properties of solid shapes, for links whose file gives none or impossible ones."""
+"""Computes mass properties of solid shapes, for links with missing or impossible mass properties."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A shape: mass [kg], centre and moments about the centre, in the frame of the link."""
+    """Shape with mass [kg], centre of mass [m] and moments about the centre [kg m^2], in the link frame."""
 
     mass: float
     centre: Array
@@ -28,13 +28,13 @@ class _Part:
 
 
 def inertial_of_shapes(shapes: list[tuple[specs.Collision, float]]) -> specs.Inertial | None:
-    """Returns the mass properties of shapes that are filled; where they overlap, both count.
+    """Computes the mass properties of filled shapes; overlapping volumes are counted repeatedly.
 
     Args:
-        shapes: Shapes of a link, each with its density [kg/m^3].
+        shapes: Shapes of a link with their densities [kg/m^3].
 
     Returns:
-        None where no shape has a volume.
+        Mass properties in the link frame; None if no shape has a volume.
 
     Raises:
         DescriptionError: A mesh cannot be read.
@@ -49,35 +49,35 @@ def inertial_of_shapes(shapes: list[tuple[specs.Collision, float]]) -> specs.Ine
         arm = part.centre - centre
         tensor += part.tensor + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     x, y, z = (float(value) for value in centre)
-    return specs.Inertial(Pose((x, y, z)), float(mass), _six(tensor))
+    return specs.Inertial(Pose((x, y, z)), float(mass), _upper_triangle(tensor))
 
 
 def with_mass(inertial: specs.Inertial, mass: float) -> specs.Inertial:
-    """Returns the same body with another mass [kg]."""
+    """Returns the mass properties scaled to a mass [kg]."""
     xx, xy, xz, yy, yz, zz = (value * mass / inertial.mass for value in inertial.inertia)
     return specs.Inertial(inertial.pose, mass, (xx, xy, xz, yy, yz, zz))
 
 
 def principal_moments(inertia: tuple[float, float, float, float, float, float]) -> tuple[float, float, float]:
-    """Returns the moments of inertia about the principal axes, in rising order."""
+    """Returns the principal moments of inertia in ascending order [kg m^2]."""
     xx, xy, xz, yy, yz, zz = inertia
     values = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
 def is_impossible(moments: tuple[float, float, float], tolerance: float = 0.0) -> bool:
-    """Whether no rigid body has such principal moments: the largest one is above the sum of the others.
+    """Returns whether no rigid body has these principal moments: the largest exceeds the sum of the other two.
 
     Args:
-        moments: In any order [kg m^2].
-        tolerance: Share by which it may be above that.
+        moments: Principal moments in any order [kg m^2].
+        tolerance: Fraction by which the largest moment may exceed the sum.
     """
-    least, middle, largest = sorted(moments)
-    return largest > (least + middle) * (1.0 + tolerance)
+    smallest, middle, largest = sorted(moments)
+    return largest > (smallest + middle) * (1.0 + tolerance)
 
 
 def along_principal_axes(inertial: specs.Inertial) -> specs.Inertial:
-    """Returns the same inertia in a frame of its principal axes."""
+    """Returns the same mass properties with the inertia axes along the principal axes."""
     xx, xy, xz, yy, yz, zz = inertial.inertia
     if (xy, xz, yz) == (0.0, 0.0, 0.0):
         return inertial
@@ -91,7 +91,7 @@ def along_principal_axes(inertial: specs.Inertial) -> specs.Inertial:
     )
 
 
-def _six(tensor: Array) -> tuple[float, float, float, float, float, float]:
+def _upper_triangle(tensor: Array) -> tuple[float, float, float, float, float, float]:
     t: Any = tensor.tolist()
     return (t[0][0], t[0][1], t[0][2], t[1][1], t[1][2], t[2][2])
 
@@ -105,7 +105,7 @@ def _part(shape: specs.Collision, density: float) -> _Part:
 
 
 def _solid(geometry: specs.Geometry) -> tuple[float, Array, Array]:
-    """Returns volume [m^3], centre [m], and moments about it for 1 kg [m^2] of a shape, in its own frame."""
+    """Returns volume [m^3], centre [m] and moments about the centre per mass [m^2], in the frame of the shape."""
     match geometry:
         case specs.Box(size=(x, y, z)):
             moments = np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
@@ -125,10 +125,10 @@ def _solid_mesh(mesh: specs.Mesh) -> tuple[float, Array, Array]:
 
     loaded = load_mesh(mesh)
     solid = trimesh.Trimesh(loaded.vertices, loaded.triangles)
-    if not solid.is_volume or solid.volume <= 0:  # an open surface encloses nothing: its hull does
+    if not solid.is_volume or solid.volume <= 0:  # an open surface has no volume, so its hull is used
         try:
             solid = solid.convex_hull
-        except Exception:  # noqa: BLE001 - qhull reports flat point sets by its own exceptions
+        except Exception:  # noqa: BLE001 - qhull reports flat point sets with its own exceptions
             return 0.0, np.zeros(3), np.zeros((3, 3))
     volume = float(solid.volume)
     if volume <= 0:

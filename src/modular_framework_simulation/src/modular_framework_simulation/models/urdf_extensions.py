@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the `<gazebo>` elements of a URDF, which say what URDF has no words for."""
+"""Reads the `<gazebo>` elements of a URDF, which contain properties that URDF does not define."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_surface import friction_coefficient, non_negative
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
-_OF_A_LINK = (
+_LINK_TAGS = (
     *("material", "mu1", "mu2", "mu", "kp", "kd", "maxVel", "minDepth"),
     *("selfCollide", "turnGravityOff", "gravity", "dampingFactor", "kinematic"),
 )
-_OF_A_JOINT = ("springStiffness", "springReference", "preserveFixedJoint", "disableFixedJointLumping")
-_SENSORS = ("sensor", "plugin")
-"""Read elsewhere."""
-_OF_THE_MODEL = ("static", "selfCollide", "self_collide")
+_JOINT_TAGS = ("springStiffness", "springReference", "preserveFixedJoint", "disableFixedJointLumping")
+_SENSOR_TAGS = ("sensor", "plugin")
+"""Elements that the sensors read."""
+_MODEL_TAGS = ("static", "selfCollide", "self_collide")
 
 
 class UrdfExtensions:
-    """The `<gazebo>` elements of one description, by what they refer to.
+    """The `<gazebo>` elements of a description, by referenced link or joint.
 
-    Joints that are fixed keep their links apart here, so that nothing has to be said about lumping.
+    The simulation does not merge links of fixed joints, so settings of the merge have no effect.
 
     Args:
         robot: Root element of the description.
-        notes: Takes what has no effect.
+        notes: Collector of notes on elements without effect.
     """
 
     def __init__(self, robot: XmlNode, notes: Notes) -> None:
@@ -37,21 +37,31 @@ class UrdfExtensions:
         for node in robot.find_all("gazebo"):
             owner = node.attributes.get("reference", "")
             if owner and owner not in joints | links:
-                notes.add(node, f"refers to '{owner}', which is no link and no joint: it has no effect")
+                notes.add(node, f"refers to '{owner}', which is not a link or joint; the element has no effect")
                 continue
-            known = _OF_THE_MODEL if not owner else (*(_OF_A_LINK if owner in links else ()), *_OF_A_JOINT)
-            known = (*known, *_SENSORS)
+            known = _MODEL_TAGS if not owner else (*(_LINK_TAGS if owner in links else ()), *_JOINT_TAGS)
+            known = (*known, *_SENSOR_TAGS)
             self._children.setdefault(owner, []).extend(node.children)
             for child in node.children:
                 if child.tag not in known:
-                    notes.add(child, "has no effect here", f"<gazebo>/<{child.tag}>")
+                    notes.add(child, "has no effect", f"<gazebo>/<{child.tag}>")
 
     def find(self, owner: str, *tags: str) -> XmlNode | None:
-        """Returns the last element of one of some names that refers to a link or joint; "" for the model."""
+        """Returns the last element of a link or joint with one of the tags; None if no element matches.
+
+        Args:
+            owner: Name of the link or joint; "" for the model.
+            tags: Tags of the element.
+        """
         return next((child for child in reversed(self._children.get(owner, [])) if child.tag in tags), None)
 
     def flag(self, owner: str, *tags: str) -> bool | None:
-        """Returns what an element says; None where there is none."""
+        """Returns the value of the last flag of a link or joint; None if no element matches.
+
+        Args:
+            owner: Name of the link or joint; "" for the model.
+            tags: Tags of the element.
+        """
         node = self.find(owner, *tags)
         return node.flag() if node is not None else None
 
@@ -63,7 +73,7 @@ class UrdfExtensions:
         return specs.Friction(1.0 if lateral is None else lateral, mu2=across)
 
     def contact(self, link: str) -> specs.SurfaceContact:
-        """Returns how the surface of a link gives way."""
+        """Returns the contact properties of a link's surface."""
         kp, kd, velocity, depth = (non_negative(self.find(link, tag)) for tag in ("kp", "kd", "maxVel", "minDepth"))
         return specs.SurfaceContact(kp, kd, velocity, depth)
 
@@ -81,9 +91,9 @@ class UrdfExtensions:
         """Returns the passive forces of a joint.
 
         Args:
-            joint: Its name.
-            damping: As URDF itself has it.
-            friction: As URDF itself has it.
+            joint: Name of the joint.
+            damping: Damping in the URDF's <dynamics> [N m s/rad or N s/m].
+            friction: Friction in the URDF's <dynamics> [N m or N].
         """
         reference = self.find(joint, "springReference")
         return specs.JointDynamics(
@@ -94,11 +104,11 @@ class UrdfExtensions:
         )
 
     def material(self, link: str) -> Material | None:
-        """Returns the look that replaces that of all visuals of a link; None where there is none."""
+        """Returns the Gazebo material that replaces the materials of a link's visuals; None if not specified."""
         node = self.find(link, "material")
         if node is None:
             return None
         found = gazebo_material(node.text.strip())
         if found is None:
-            self._notes.add(node, f"'{node.text.strip()}' is no material that is known here: it has no effect")
+            self._notes.add(node, f"'{node.text.strip()}' is not a known material; the element has no effect")
         return found

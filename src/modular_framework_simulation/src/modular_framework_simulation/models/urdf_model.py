@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads simple objects written in URDF: links with boxes, cylinders, spheres and meshes, joined by simple joints."""
+"""Reads objects written in URDF: links with boxes, cylinders, spheres and meshes, connected by joints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.materials import Material
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.sdf_inertial import usable
+from modular_framework_simulation.models.sdf_inertial import with_valid_inertia
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_shapes import MissingMeshError
@@ -23,13 +23,13 @@ from modular_framework_urdf.rotations import Vector3
 from modular_framework_urdf.xml_text import XACRO_TAGS
 
 _GEOMETRIES = ("box", "cylinder", "sphere", "mesh")
-_READ = ("link", "joint", "gazebo", "material")
-_WEIGHTLESS = specs.Inertial(Pose(), 1e-5, (1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
-"""Of a link without mass properties: small enough to be of no account, and not 0, which the engine cannot take."""
+_SUPPORTED_TAGS = ("link", "joint", "gazebo", "material")
+_FRAME_INERTIAL = specs.Inertial(Pose(), 1e-5, (1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
+"""Mass properties of a link without inertia: negligible, but not 0, which the engine cannot simulate."""
 
 
 class _Type(Enum):
-    """The joints of URDF that are simulated."""
+    """URDF joint types that are simulated."""
 
     FIXED = "fixed"
     REVOLUTE = "revolute"
@@ -38,22 +38,22 @@ class _Type(Enum):
 
     @property
     def spec(self) -> specs.JointType:
-        """The same in our words."""
+        """Returns the equivalent SDF joint type."""
         return specs.JointType(self.value)
 
 
 def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model:
     """Reads an object.
 
-    A root link called "world" fastens the object to the world, as it does in Gazebo.
+    A root link named "world" fixes the object to the world, as in Gazebo.
 
     Args:
-        text: URDF.
-        source: What to call the text in messages.
-        resources: Where meshes are found.
+        text: URDF text.
+        source: Name of the text in messages.
+        resources: Folders and packages for meshes.
 
     Raises:
-        DescriptionError: Something in it cannot be used.
+        DescriptionError: The text has unsupported or invalid content.
     """
     root = parse_xml(text, source)
     if root.tag != "robot":
@@ -62,36 +62,38 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     parents = {_role(joint, "child"): joint for joint in joint_nodes}
     nodes = [link for link in root.find_all("link") if link.name() != "world"]
     if not nodes:
-        raise DescriptionError(root.where, "has no <link>", "an object needs at least one besides 'world'")
+        raise DescriptionError(root.where, "has no <link>", "an object needs a link that is not named 'world'")
     notes = Notes()
     extensions = UrdfExtensions(root, notes)
     for child in root.children:
         if child.tag.startswith(XACRO_TAGS):
-            raise DescriptionError(child.where, "this is xacro", "allowed: URDF; expand the file with xacro first")
-        if child.tag not in _READ:
-            notes.add(child, "has no effect here", child.tag)
+            raise DescriptionError(child.where, "is xacro", "allowed: URDF; expand the file with xacro first")
+        if child.tag not in _SUPPORTED_TAGS:
+            notes.add(child, "has no effect", child.tag)
     colours = _named_colours(root)
     links = tuple(_read_link(node, parents, extensions, resources, colours, notes) for node in nodes)
     known = [link.name for link in links] + [specs.WORLD]
     joints = tuple(_read_joint(joint, known, extensions, notes) for joint in joint_nodes)
     _refuse_two_parents(joint_nodes)
     _refuse_mimic_circles(joint_nodes)
-    fastened = all(each.kind is specs.JointType.FIXED for each in joints) and any(j.parent == "world" for j in joints)
-    static = fastened or extensions.flag("", "static") is True
+    fixed_to_world = all(each.kind is specs.JointType.FIXED for each in joints) and any(
+        j.parent == "world" for j in joints
+    )
+    static = fixed_to_world or extensions.flag("", "static") is True
     self_collide = extensions.flag("", "self_collide", "selfCollide") is True
     sensors = urdf_sensor_elements(root)
     return specs.Model(root.name(), Pose(), static, links, joints, source, self_collide, notes.lines, sensors)
 
 
-def collision_name(given: str, link: str, number: int) -> str:
-    """Returns the name of a <collision>: its own, or the one that Gazebo gives it.
+def collision_name(given: str, link: str, index: int) -> str:
+    """Returns the name of a <collision>; for an empty name, the name that Gazebo assigns.
 
     Args:
-        given: Its own name, mostly empty.
-        link: The link it is in.
-        number: Which one of the link it is, from 0.
+        given: Name in the description, often empty.
+        link: Name of the link.
+        index: Index of the <collision> in the link, from 0.
     """
-    return given or (f"{link}_collision_{number}" if number else f"{link}_collision")
+    return given or (f"{link}_collision_{index}" if index else f"{link}_collision")
 
 
 def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:
@@ -116,8 +118,8 @@ def _refuse_two_parents(joints: list[XmlNode]) -> None:
 
 
 def _named_colours(root: XmlNode) -> dict[str, specs.Colour]:
-    """Returns the colours of the materials that stand in the description, by name."""
-    every = root.find_all("material") + [
+    """Returns the colours of the materials in the description, by name."""
+    materials = root.find_all("material") + [
         material
         for link in root.find_all("link")
         for visual in link.find_all("visual")
@@ -125,7 +127,7 @@ def _named_colours(root: XmlNode) -> dict[str, specs.Colour]:
     ]
     return {
         material.attributes["name"]: _colour(colour)
-        for material in every
+        for material in materials
         if material.attributes.get("name") and (colour := material.find("color")) is not None
     }
 
@@ -169,29 +171,29 @@ def _read_link(
     friction, contact = extensions.friction(name), extensions.contact(name)
     collisions = tuple(
         specs.Collision(
-            collision_name(child.attributes.get("name", ""), name, number),
+            collision_name(child.attributes.get("name", ""), name, index),
             _origin(child),
             _geometry(child.require("geometry"), resources),
             friction,
             contact=contact,
         )
-        for number, child in enumerate(node.find_all("collision"))
+        for index, child in enumerate(node.find_all("collision"))
     )
     visuals = []
-    for number, child in enumerate(node.find_all("visual")):
+    for index, child in enumerate(node.find_all("visual")):
         try:
             shape = _geometry(child.require("geometry"), resources)
         except MissingMeshError as error:
             notes.add(child, f"is not drawn: {error}")
             continue
-        visuals.append(_visual(child, f"{name}_visual_{number}", shape, extensions.material(name), colours))
+        visuals.append(_visual(child, f"{name}_visual_{index}", shape, extensions.material(name), colours))
     inertial = node.find("inertial")
     if inertial is None:
-        notes.add(node, "has no <inertial>: it is a frame that weighs next to nothing")
+        notes.add(node, "has no <inertial>; the link is a frame with negligible mass")
     return specs.Link(
         name,
         _pose_in_root(name, parents),
-        _inertial(inertial, collisions, notes) if inertial is not None else _WEIGHTLESS,
+        _inertial(inertial, collisions, notes) if inertial is not None else _FRAME_INERTIAL,
         collisions,
         tuple(visuals),
         extensions.velocity_decay(name),
@@ -204,7 +206,7 @@ def _read_link(
 def _visual(
     node: XmlNode, name: str, shape: specs.Geometry, replaced: Material | None, colours: dict[str, specs.Colour]
 ) -> specs.Visual:
-    """Reads a <visual>; a material of Gazebo replaces its own."""
+    """Reads a <visual>; a Gazebo material replaces the visual's own material."""
     material = node.find("material")
     colour: specs.Colour | None = None
     if replaced is not None:
@@ -225,7 +227,7 @@ def _inertial(node: XmlNode, collisions: tuple[specs.Collision, ...], notes: Not
         raise DescriptionError(mass_node.where, f"got mass {mass:g} kg", "allowed: greater than 0")
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     xx, xy, xz, yy, yz, zz = (parse_numbers(inertia.where, inertia.attributes.get(each, "0"), 1)[0] for each in names)
-    return usable(specs.Inertial(_origin(node), mass, (xx, xy, xz, yy, yz, zz)), collisions, inertia, notes)
+    return with_valid_inertia(specs.Inertial(_origin(node), mass, (xx, xy, xz, yy, yz, zz)), collisions, inertia, notes)
 
 
 def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
@@ -253,7 +255,7 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
         case "mesh":
             x, y, z = lengths("scale", 3, "1 1 1")
             return specs.Mesh(_mesh_file(shape, resources), (x, y, z))
-    raise DescriptionError(node.where, f"holds <{shape.tag}>", f"allowed: one of {', '.join(_GEOMETRIES)}")
+    raise DescriptionError(node.where, f"contains <{shape.tag}>", f"allowed: one of {', '.join(_GEOMETRIES)}")
 
 
 def _mesh_file(shape: XmlNode, resources: Resources) -> Path:
@@ -267,16 +269,16 @@ def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, not
     kind = node.choice("type", _Type, "joint type").spec
     for role in ("parent", "child"):
         if _role(node, role) not in links:
-            raise DescriptionError(node.where, f"{role} '{_role(node, role)}' is no link", f"allowed: {links}")
+            raise DescriptionError(node.where, f"{role} '{_role(node, role)}' is not a link", f"allowed: {links}")
     if (mimic := node.find("mimic")) is not None:
-        notes.add(mimic, "has no effect here, as in Gazebo: the joint moves by itself")
+        notes.add(mimic, "has no effect, as in Gazebo; the joint moves independently")
     limit, dynamics = node.find("limit"), node.find("dynamics")
     bounds = (-math.inf, math.inf)
     if limit is not None and kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
         bounds = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
         if bounds[0] > bounds[1]:
             problem = f"got lower {bounds[0]:g} and upper {bounds[1]:g}"
-            raise DescriptionError(limit.where, problem, "allowed: a lower one below the upper")
+            raise DescriptionError(limit.where, problem, "allowed: a lower limit below the upper limit")
     return specs.Joint(
         node.name(),
         kind,

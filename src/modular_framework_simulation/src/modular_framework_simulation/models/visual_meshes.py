@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts what is seen of a model into files the physics engine draws: one .obj file for each material.
+"""Converts visible shapes into files for the physics engine's renderer: one .obj file per material.
 
-The engine's own reader of COLLADA files knows neither their unit nor their pictures. Converted files are kept in a
-cache folder under a name made of the content of the mesh and of its pictures.
+The engine's own COLLADA reader ignores the unit and the textures. Converted files are cached in a folder named by a
+hash of the mesh and its images.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from modular_framework_simulation.models.sdf_specs import Box, Colour, Cylinder,
 from modular_framework_urdf import collada
 
 _CACHE_VERSION = "4"
-_LIST = "parts.json"
-_PICTURE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
+_COLOURS_FILE = "parts.json"
+_REFERENCED_FILE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
 _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
-_IMAGE = re.compile(rb"<image\b[^>]*>\s*<init_from>\s*([^<]+?)\s*</init_from>")
-_LEAST_ALPHA = 0.05
-"""Exporters disagree about what is transparent: a part that would not be seen at all is drawn opaque."""
-_LARGEST_PICTURE_PX = 2048
+_COLLADA_IMAGE = re.compile(rb"<image\b[^>]*>\s*<init_from>\s*([^<]+?)\s*</init_from>")
+_MIN_ALPHA = 0.05
+"""Minimum opacity; exporters disagree about the meaning of transparency, so an invisible part is drawn opaque."""
+_MAX_IMAGE_SIZE_PX = 2048
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnPart:
-    """A part of a shape with one material.
+    """Part of a shape with one material.
 
     Attributes:
-        file: The .obj file, in metres; its picture stands beside it.
-        colour: What the picture is multiplied with, or the plain colour.
+        file: The .obj file, in metres, with its texture in the same folder.
+        colour: Plain colour, or the factor of the texture's colours.
     """
 
     file: Path
@@ -55,10 +55,10 @@ class DrawnPart:
 
 
 class VisualMeshes:
-    """Gives the parts of visual shapes as files, from the cache when they are there.
+    """Converts visible shapes into files of their parts, and caches the files.
 
     Args:
-        cache_folder: Made when first needed.
+        cache_folder: Folder of the cache, created when needed.
     """
 
     def __init__(self, cache_folder: Path) -> None:
@@ -68,22 +68,22 @@ class VisualMeshes:
         """Returns the parts of a visual.
 
         Raises:
-            DescriptionError: Its mesh cannot be read.
+            DescriptionError: The mesh cannot be read.
         """
         folder = self._cache_folder / f"drawn-{self._key(visual)}"
-        if not (folder / _LIST).is_file():
+        if not (folder / _COLOURS_FILE).is_file():
             files: dict[str, bytes] = {}
             colours = []
-            for number, part in enumerate(drawn_bodies_of(visual)):
-                name = f"part_{number:03d}"
+            for index, part in enumerate(drawn_bodies_of(visual)):
+                name = f"part_{index:03d}"
                 files |= _obj_files(name, part)
                 colours.append(part.colour)
-            files[_LIST] = json.dumps(colours).encode()
+            files[_COLOURS_FILE] = json.dumps(colours).encode()
             write_folder(folder, files)
-        colours = json.loads((folder / _LIST).read_text(encoding="ascii"))
+        colours = json.loads((folder / _COLOURS_FILE).read_text(encoding="ascii"))
         red_green_blue_alpha = [(float(r), float(g), float(b), float(a)) for r, g, b, a in colours]
         return tuple(
-            DrawnPart(folder / f"part_{number:03d}.obj", colour) for number, colour in enumerate(red_green_blue_alpha)
+            DrawnPart(folder / f"part_{index:03d}.obj", colour) for index, colour in enumerate(red_green_blue_alpha)
         )
 
     @staticmethod
@@ -91,7 +91,7 @@ class VisualMeshes:
         key = hashlib.sha256(f"{_CACHE_VERSION}|{visual.geometry}|{visual.colour}|{visual.own_materials}".encode())
         files = [visual.texture] if visual.texture is not None else []
         if isinstance(visual.geometry, Mesh):
-            files += [visual.geometry.path, *_pictures_of(visual.geometry.path)]
+            files += [visual.geometry.path, *_referenced_files(visual.geometry.path)]
         for file in files:
             try:
                 key.update(file.read_bytes())
@@ -100,25 +100,27 @@ class VisualMeshes:
         return key.hexdigest()[:24]
 
 
-def _pictures_of(mesh: Path) -> list[Path]:
-    """Returns the files that the text of a mesh refers to and that are there."""
+def _referenced_files(mesh: Path) -> list[Path]:
+    """Returns the existing files that the text of a mesh refers to."""
     if mesh.suffix.lower() not in (".dae", ".obj"):
         return []
     try:
-        names = [(first or second).decode(errors="replace") for first, second in _PICTURE.findall(mesh.read_bytes())]
+        names = [
+            (first or second).decode(errors="replace") for first, second in _REFERENCED_FILE.findall(mesh.read_bytes())
+        ]
     except OSError:
         return []
-    found = [picture for name in dict.fromkeys(names) if (picture := find_picture(mesh, name)) is not None]
-    return found + [other for file in found if file.suffix == ".mtl" for other in _pictures_of_library(mesh, file)]
+    found = [image for name in dict.fromkeys(names) if (image := find_image(mesh, name)) is not None]
+    return found + [other for file in found if file.suffix == ".mtl" for other in _images_of_library(mesh, file)]
 
 
-def _pictures_of_library(mesh: Path, library: Path) -> list[Path]:
-    names = [second.decode(errors="replace") for _, second in _PICTURE.findall(library.read_bytes()) if second]
-    return [picture for name in names if (picture := find_picture(mesh, name)) is not None]
+def _images_of_library(mesh: Path, library: Path) -> list[Path]:
+    names = [second.decode(errors="replace") for _, second in _REFERENCED_FILE.findall(library.read_bytes()) if second]
+    return [image for name in names if (image := find_image(mesh, name)) is not None]
 
 
-def find_picture(mesh: Path, name: str) -> Path | None:
-    """Returns a file that a mesh refers to: beside it, or among the textures of its model; None if there is none."""
+def find_image(mesh: Path, name: str) -> Path | None:
+    """Returns a file that a mesh refers to, in the mesh's folder or the textures of its model; None if missing."""
     plain = unquote(name.removeprefix("file://")).replace("\\", "/").strip()
     base = plain.rpartition("/")[2]
     textures = mesh.parent.parent / "materials" / "textures"
@@ -128,59 +130,59 @@ def find_picture(mesh: Path, name: str) -> Path | None:
     return None
 
 
-def missing_pictures(mesh: Path) -> list[str]:
-    """Returns the pictures that a COLLADA file names and that are not there."""
+def missing_images(mesh: Path) -> list[str]:
+    """Returns the names of missing images of a COLLADA file."""
     if mesh.suffix.lower() != ".dae":
         return []
     try:
-        names = [name.decode(errors="replace") for name in _IMAGE.findall(mesh.read_bytes())]
+        names = [name.decode(errors="replace") for name in _COLLADA_IMAGE.findall(mesh.read_bytes())]
     except OSError:
         return []
-    return [name for name in dict.fromkeys(names) if find_picture(mesh, name) is None]
+    return [name for name in dict.fromkeys(names) if find_image(mesh, name) is None]
 
 
-class _Pictures:
-    """Opens the files a mesh refers to for its reader."""
+class _MeshFiles:
+    """Opens the files that a mesh refers to, as a resolver for trimesh."""
 
     def __init__(self, mesh: Path) -> None:
         self._mesh = mesh
 
     def get(self, name: str) -> bytes:
-        """Returns the content of a file."""
-        picture = find_picture(self._mesh, name)
-        if picture is None:
+        """Returns the content of a file of the mesh."""
+        image = find_image(self._mesh, name)
+        if image is None:
             raise FileNotFoundError(name)
-        return picture.read_bytes()
+        return image.read_bytes()
 
     def __getitem__(self, name: str) -> bytes:
-        """Returns the content of a file; so the reader asks for the materials of an .obj file."""
+        """Returns the content of a file; trimesh reads the materials of an .obj file with this method."""
         return self.get(name)
 
 
 def drawn_bodies_of(visual: Visual) -> list[DrawnBody]:
-    """Returns the triangles of a visual, one body for each material.
+    """Returns the triangles of a visual, one body per material.
 
     Raises:
-        DescriptionError: Its mesh cannot be read.
+        DescriptionError: The mesh cannot be read.
     """
-    picture = _open(visual.texture) if visual.texture is not None else None
+    image = _open(visual.texture) if visual.texture is not None else None
     match visual.geometry:
         case Plane(normal=normal, size=size):
-            return [drawn_plane(np.array(normal), size, visual.colour, picture)]
+            return [drawn_plane(np.array(normal), size, visual.colour, image)]
         case Box(size=size):
-            return [drawn_box(np.array(size), visual.colour, picture)]
+            return [drawn_box(np.array(size), visual.colour, image)]
         case Cylinder(radius=radius, length=length):
-            return [drawn_cylinder(radius, length, visual.colour, picture)]
+            return [drawn_cylinder(radius, length, visual.colour, image)]
         case Sphere(radius=radius):
-            return [drawn_sphere(radius, visual.colour, picture)]
+            return [drawn_sphere(radius, visual.colour, image)]
         case Mesh() as mesh:
-            if not visual.own_materials and picture is None:
+            if not visual.own_materials and image is None:
                 whole = load_mesh(mesh)
                 return [DrawnBody(whole.vertices, whole.triangles, None, None, visual.colour, None)]
             parts = _own_parts(mesh)
             if visual.own_materials:
                 return parts
-            return [DrawnBody(p.vertices, p.triangles, p.normals, p.uv, visual.colour, picture) for p in parts]
+            return [DrawnBody(p.vertices, p.triangles, p.normals, p.uv, visual.colour, image) for p in parts]
     raise TypeError(f"{type(visual.geometry).__name__} is no geometry")
 
 
@@ -188,17 +190,17 @@ def _open(path: Path) -> Any:
     from PIL import Image
 
     try:
-        with Image.open(path) as picture:
-            return picture.convert("RGB")
+        with Image.open(path) as image:
+            return image.convert("RGB")
     except (OSError, ValueError):
         return None
 
 
 def _own_parts(mesh: Mesh) -> list[DrawnBody]:
-    """Returns the parts of a mesh file with the materials it names itself."""
+    """Returns the parts of a mesh file with the materials of the file."""
     import trimesh
 
-    load_mesh(mesh)  # says what is wrong with a file, in our words
+    load_mesh(mesh)  # reports a fault of the file in this package's terms
     kind = mesh.path.suffix.lower().removeprefix(".")
     content, unit = mesh.path.read_bytes(), 1.0
     if kind == "dae":
@@ -210,20 +212,20 @@ def _own_parts(mesh: Mesh) -> list[DrawnBody]:
     elif mesh.submesh or kind != "obj":
         whole = load_mesh(mesh)
         return [DrawnBody(whole.vertices, whole.triangles, None, None, (0.7, 0.7, 0.7, 1.0), None)]
-    pictures: Any = _Pictures(mesh.path)
-    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, resolver=pictures)
+    files: Any = _MeshFiles(mesh.path)
+    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, resolver=files)
     bodies: list[Any] = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
     bodies = [body for body in bodies if isinstance(body, trimesh.Trimesh) and len(body.faces)]
     shift = np.zeros(3)
     if mesh.center:
-        every = np.concatenate([body.vertices for body in bodies])
-        shift = (every.min(axis=0) + every.max(axis=0)) / 2
+        all_vertices = np.concatenate([body.vertices for body in bodies])
+        shift = (all_vertices.min(axis=0) + all_vertices.max(axis=0)) / 2
     scale = np.array(mesh.scale)
     return [_part_of(body, unit, scale, shift) for body in bodies]
 
 
 def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> DrawnBody:
-    colour, picture = _look_of(body.visual)
+    colour, image = _look_of(body.visual)
     uv = getattr(body.visual, "uv", None)
     if uv is not None and len(uv) != len(body.vertices):
         uv = None
@@ -232,32 +234,32 @@ def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> DrawnBody:
     if np.prod(scale) < 0:
         triangles = triangles[:, ::-1]
     vertices = (np.asarray(body.vertices, dtype=np.float64) - shift) * unit * scale
-    return DrawnBody(vertices, triangles, normals, None if uv is None else np.asarray(uv), colour, picture)
+    return DrawnBody(vertices, triangles, normals, None if uv is None else np.asarray(uv), colour, image)
 
 
 def _look_of(look: Any) -> tuple[Colour, Any]:
-    """Returns the colour and the picture of a part as trimesh has them."""
+    """Returns the colour and the texture of a part loaded by trimesh."""
     material = getattr(look, "material", None)
     if material is None:
         return ((0.7, 0.7, 0.7, 1.0), None)
-    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     values = np.asarray(getattr(material, "main_color", (255, 255, 255, 255)), dtype=float) / 255.0
     red, green, blue, alpha = (float(value) for value in values[:4])
-    if picture is not None:
-        return (_WHITE, picture.convert("RGB"))
-    return ((red, green, blue, alpha if alpha >= _LEAST_ALPHA else 1.0), None)
+    if image is not None:
+        return (_WHITE, image.convert("RGB"))
+    return ((red, green, blue, alpha if alpha >= _MIN_ALPHA else 1.0), None)
 
 
 def _obj_files(name: str, part: DrawnBody) -> dict[str, bytes]:
-    """Returns the files of a part by name: .obj, and with a picture .mtl and .png."""
+    """Returns the files of a part by name: .obj, and with a texture also .mtl and .png."""
     files: dict[str, bytes] = {}
     lines: list[str] = []
-    textured = part.picture is not None and part.uv is not None
+    textured = part.image is not None and part.uv is not None
     if textured:
-        picture = part.picture.copy()
-        picture.thumbnail((_LARGEST_PICTURE_PX, _LARGEST_PICTURE_PX))
+        image = part.image.copy()
+        image.thumbnail((_MAX_IMAGE_SIZE_PX, _MAX_IMAGE_SIZE_PX))
         stream = io.BytesIO()
-        picture.save(stream, "PNG")
+        image.save(stream, "PNG")
         files[f"{name}.png"] = stream.getvalue()
         files[f"{name}.mtl"] = f"newmtl {name}\nKd 1 1 1\nmap_Kd {name}.png\n".encode()
         lines += [f"mtllib {name}.mtl", f"usemtl {name}"]
@@ -267,8 +269,8 @@ def _obj_files(name: str, part: DrawnBody) -> dict[str, bytes]:
     if part.normals is not None:
         lengths = np.linalg.norm(part.normals, axis=1, keepdims=True)
         lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in part.normals / np.where(lengths > 0, lengths, 1.0)]
-    form = {(True, True): "{0}/{0}/{0}", (True, False): "{0}/{0}", (False, True): "{0}//{0}", (False, False): "{0}"}
-    corner = form[textured, part.normals is not None]
+    formats = {(True, True): "{0}/{0}/{0}", (True, False): "{0}/{0}", (False, True): "{0}//{0}", (False, False): "{0}"}
+    corner = formats[textured, part.normals is not None]
     lines += ["f " + " ".join(corner.format(index + 1) for index in triangle) for triangle in part.triangles]
     files[f"{name}.obj"] = ("\n".join(lines) + "\n").encode("ascii")
     return files

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""XML whose elements remember their file and line, so that a fault in a model can be pointed at."""
+"""XML elements that keep their file and line for error messages."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from modular_framework_urdf import xml_text
 
 Choice = TypeVar("Choice", bound=Enum)
 
-_LATE_DECLARATION = re.compile(r"(?:\s|<!--(?:(?!-->).)*-->)+(<\?xml\b[^>]*\?>)", re.DOTALL)
+_MISPLACED_DECLARATION = re.compile(r"(?:\s|<!--(?:(?!-->).)*-->)+(<\?xml\b[^>]*\?>)", re.DOTALL)
 _ENCODING = re.compile(rb"""^\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 
 
 @dataclass(slots=True)
 class XmlNode:
-    """One element of a description.
+    """XML element of a description.
 
     Attributes:
-        tag: Element name.
+        tag: Tag of the element.
         attributes: Attribute values by name.
-        source: File (or other origin) the element stands in.
-        line: Line in that source, from 1.
+        source: File (or other origin) of the element.
+        line: Line number in the source, from 1.
         text: Text directly inside the element.
-        children: Elements inside, in order.
+        children: Child elements, in order.
     """
 
     tag: str
@@ -41,43 +41,43 @@ class XmlNode:
 
     @property
     def where(self) -> str:
-        """Source, line and element, as an error message starts."""
+        """Returns source, line and tag, for the start of an error message."""
         name = self.attributes.get("name")
         label = f"<{self.tag} name='{name}'>" if name is not None else f"<{self.tag}>"
         return f"{self.source}:{self.line}: {label}"
 
     def find(self, tag: str) -> XmlNode | None:
-        """Returns the first child element of that name, None if there is none."""
+        """Returns the first child with a tag; None if no child has the tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def find_all(self, tag: str) -> list[XmlNode]:
-        """Returns all child elements of that name."""
+        """Returns all children with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def find_path(self, *tags: str) -> XmlNode | None:
-        """Returns the element reached by following the first child of each name."""
+        """Returns the element at a path of tags, following the first match at each level; None without a match."""
         node: XmlNode | None = self
         for tag in tags:
             node = node.find(tag) if node is not None else None
         return node
 
     def require(self, tag: str) -> XmlNode:
-        """Returns the first child of that name.
+        """Returns the first child with a tag.
 
         Raises:
-            DescriptionError: There is none.
+            DescriptionError: No child has the tag.
         """
         child = self.find(tag)
         if child is None:
             got = ", ".join(f"<{each.tag}>" for each in self.children) or "nothing"
-            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is needed here, got {got}")
+            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is required, got {got}")
         return child
 
     def name(self) -> str:
         """Returns the attribute `name`.
 
         Raises:
-            DescriptionError: It is missing or empty.
+            DescriptionError: The attribute is missing or empty.
         """
         value = self.attributes.get("name", "")
         if not value:
@@ -85,31 +85,40 @@ class XmlNode:
         return value
 
     def numbers(self, count: int) -> tuple[float, ...]:
-        """Returns the text as that many finite numbers.
+        """Parses the text as a given number of finite values.
 
         Raises:
-            DescriptionError: Another count, or something that is not a finite number.
+            DescriptionError: The number of values is different, or a value is not a finite number.
         """
         return parse_numbers(self.where, self.text, count)
 
-    def number_list(self, least: int, most: int) -> tuple[float, ...]:
-        """Returns the text as finite numbers, as many as there are within two bounds.
+    def number_list(self, min_count: int, max_count: int) -> tuple[float, ...]:
+        """Parses the text as finite values.
+
+        Args:
+            min_count: Minimum number of values.
+            max_count: Maximum number of values.
 
         Raises:
-            DescriptionError: Another count, or something that is not a finite number.
+            DescriptionError: The number of values is outside the range, or a value is not a finite number.
         """
-        count = min(max(len(self.text.split()), least), most)
+        count = min(max(len(self.text.split()), min_count), max_count)
         return parse_numbers(self.where, self.text, count)
 
     def number(self) -> float:
-        """Returns the text as one finite number."""
+        """Parses the text as one finite number."""
         return self.numbers(1)[0]
 
     def choice(self, attribute: str, choices: type[Choice], what: str) -> Choice:
-        """Returns the value of an attribute as one of the members of an Enum.
+        """Returns the value of an attribute as a member of an Enum.
+
+        Args:
+            attribute: Name of the attribute.
+            choices: Enum class whose values are the allowed attribute values.
+            what: Description of the attribute for the error message.
 
         Raises:
-            DescriptionError: It is none of them.
+            DescriptionError: The value is not an allowed value.
         """
         value = self.attributes.get(attribute, "")
         try:
@@ -119,10 +128,10 @@ class XmlNode:
             raise DescriptionError(self.where, f"got {what} '{value}'", f"allowed: {allowed}") from error
 
     def flag(self) -> bool:
-        """Returns the text as a bool.
+        """Parses the text as a bool.
 
         Raises:
-            DescriptionError: Neither true, false, 1 nor 0.
+            DescriptionError: The text is not true, false, 1 or 0.
         """
         value = self.text.strip().lower()
         if value in ("true", "1"):
@@ -133,15 +142,15 @@ class XmlNode:
 
 
 def parse_numbers(where: str, text: str, count: int) -> tuple[float, ...]:
-    """Returns a text as that many finite numbers.
+    """Parses a text as a given number of finite values.
 
     Args:
-        where: Named in the error.
+        where: Location for the error message.
         text: Numbers separated by white space.
-        count: How many there have to be.
+        count: Expected number of values.
 
     Raises:
-        DescriptionError: Another count, or something that is not a finite number.
+        DescriptionError: The number of values is different, or a value is not a finite number.
     """
     words = text.split()
     try:
@@ -157,8 +166,8 @@ def parse_xml(text: str, source: str) -> XmlNode:
     """Parses a document.
 
     Args:
-        text: The XML.
-        source: Where it comes from, for messages.
+        text: XML text.
+        source: Origin of the text for messages.
 
     Returns:
         The root element.
@@ -167,21 +176,21 @@ def parse_xml(text: str, source: str) -> XmlNode:
         DescriptionError: The text is not well-formed XML, or has a DOCTYPE.
     """
     try:
-        return _node(xml_text.parse(_begun_properly(text), source), source)
+        return _node(xml_text.parse(_with_valid_start(text), source), source)
     except xml_text.XmlError as error:
         raise DescriptionError(error.where, error.found, error.allowed) from error
 
 
-def _begun_properly(text: str) -> str:
-    """Returns a document without a byte order mark, and without a declaration behind empty lines or comments.
+def _with_valid_start(text: str) -> str:
+    """Removes a byte order mark, and an XML declaration after blank lines or comments, which Gazebo accepts.
 
-    Gazebo reads both; the numbers of the lines stay as they are.
+    Line numbers do not change.
     """
     text = text.removeprefix("\ufeff")
-    late = _LATE_DECLARATION.match(text)
-    if late is None:
+    misplaced = _MISPLACED_DECLARATION.match(text)
+    if misplaced is None:
         return text
-    return text[: late.start(1)] + "\n" * late.group(1).count("\n") + text[late.end(1) :]
+    return text[: misplaced.start(1)] + "\n" * misplaced.group(1).count("\n") + text[misplaced.end(1) :]
 
 
 def _node(element: xml_text.Element, source: str) -> XmlNode:
@@ -194,7 +203,7 @@ def read_xml(path: Path) -> XmlNode:
     """Parses a file.
 
     Raises:
-        DescriptionError: It cannot be read or is not well-formed XML.
+        DescriptionError: The file cannot be read or is not well-formed XML.
     """
     try:
         text = _decoded(path.read_bytes())
@@ -204,7 +213,7 @@ def read_xml(path: Path) -> XmlNode:
 
 
 def _decoded(content: bytes) -> str:
-    """Returns the text of a file, in the encoding that its first bytes or its declaration name; UTF-8 without."""
+    """Decodes the content of a file with the encoding of its byte order mark or XML declaration; UTF-8 by default."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16")
     declared = _ENCODING.match(content)

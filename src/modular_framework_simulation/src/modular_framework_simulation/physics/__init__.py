@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world in the physics engine, and the robot in it behind `RobotHW`."""
+"""Simulated world in the physics engine, and the robot's `RobotHW`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forces and torques that requests let act on links and joints for some of simulated time."""
+"""Forces and torques on links and joints that requests apply for an interval of simulated time."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from modular_framework_urdf.rotations import Vector3
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A stretch of simulated time.
+    """Interval of simulated time.
 
     Attributes:
-        start_ns: Its beginning [ns]; a step that begins before is outside.
-        end_ns: Its end [ns], None without; a step that begins then or later is outside.
+        start_ns: Start [ns]; steps that begin earlier are outside.
+        end_ns: End [ns], or None; steps that begin at the end or later are outside.
     """
 
     start_ns: int
@@ -28,24 +28,30 @@ class Interval:
 
     @staticmethod
     def from_request(now_ns: int, start_ns: int, duration_ns: int) -> Interval:
-        """Returns the interval of a request: a start in the past means now, a negative duration has no end."""
-        begin = max(now_ns, start_ns)
-        return Interval(begin, None if duration_ns < 0 else begin + duration_ns)
+        """Returns the interval of a request.
+
+        Args:
+            now_ns: Current simulated time [ns].
+            start_ns: Requested start [ns]; a time in the past stands for the current time.
+            duration_ns: Requested duration [ns]; a negative duration stands for no end.
+        """
+        start = max(now_ns, start_ns)
+        return Interval(start, None if duration_ns < 0 else start + duration_ns)
 
     def is_over(self, time_ns: int) -> bool:
-        """Whether no step that begins now or later is inside."""
+        """Returns whether all steps that begin now or later are outside."""
         return self.end_ns is not None and time_ns >= self.end_ns
 
 
 @dataclass(frozen=True, slots=True)
 class LinkWrench:
-    """A force and a torque on a link.
+    """Force and torque on a link.
 
     Attributes:
-        link: What they act on.
-        force: At the centre of mass, in the world frame [N].
-        torque: In the world frame [Nm].
-        interval: When they act.
+        link: Name of the link.
+        force: Force at the centre of mass, in the world frame [N].
+        torque: Torque in the world frame [Nm].
+        interval: Interval of the wrench.
     """
 
     link: PartName
@@ -56,7 +62,7 @@ class LinkWrench:
 
 @dataclass(frozen=True, slots=True)
 class JointEffort:
-    """A torque [Nm] or force [N] along the axis of a joint."""
+    """Torque [Nm] or force [N] along the axis of a joint."""
 
     joint: PartName
     effort: float
@@ -65,19 +71,19 @@ class JointEffort:
 
 @dataclass(frozen=True, slots=True)
 class SavedForces:
-    """A copy of what acts and will act."""
+    """Copy of all current and future forces."""
 
     wrenches: tuple[LinkWrench, ...]
     efforts: tuple[JointEffort, ...]
 
 
 class AppliedForces:
-    """What acts on the world besides gravity, contacts and the drives of the robot; used by one thread.
+    """Forces on the world in addition to gravity, contacts and the robot's drives; used by one thread.
 
-    The engine drops forces after each step, so they are applied again before every one.
+    The engine discards forces after each step, so they are applied before every step.
 
     Args:
-        engine: Where they act.
+        engine: The physics engine.
     """
 
     def __init__(self, engine: PhysicsEngine) -> None:
@@ -87,31 +93,31 @@ class AppliedForces:
 
     @property
     def pending(self) -> bool:
-        """Whether something acts or will act."""
+        """Returns whether any current or future force exists."""
         return bool(self._wrenches or self._efforts)
 
     def add_wrench(self, wrench: LinkWrench) -> None:
-        """Adds a force and a torque; several on one link add up."""
+        """Adds a wrench; several wrenches on a link add up."""
         self._wrenches.append(wrench)
 
     def add_effort(self, effort: JointEffort) -> None:
-        """Adds an effort; several on one joint add up."""
+        """Adds an effort; several efforts on a joint add up."""
         self._efforts.append(effort)
 
     def clear_link(self, link: PartName) -> int:
-        """Ends all wrenches on a link, also those to come; returns how many."""
+        """Removes all current and future wrenches on a link; returns their number."""
         before = len(self._wrenches)
         self._wrenches = [each for each in self._wrenches if each.link != link]
         return before - len(self._wrenches)
 
     def clear_joint(self, joint: PartName) -> int:
-        """Ends all efforts on a joint, also those to come; returns how many."""
+        """Removes all current and future efforts on a joint; returns their number."""
         before = len(self._efforts)
         self._efforts = [each for each in self._efforts if each.joint != joint]
         return before - len(self._efforts)
 
     def clear(self) -> None:
-        """Ends all wrenches and efforts."""
+        """Removes all wrenches and efforts."""
         self._wrenches, self._efforts = [], []
 
     def saved(self) -> SavedForces:
@@ -119,20 +125,20 @@ class AppliedForces:
         return SavedForces(tuple(self._wrenches), tuple(self._efforts))
 
     def restore(self, saved: SavedForces) -> None:
-        """Continues with the wrenches and efforts of a copy."""
+        """Restores the wrenches and efforts of a copy."""
         self._wrenches, self._efforts = list(saved.wrenches), list(saved.efforts)
 
     def forget_model(self, model: str) -> None:
-        """Ends everything that has to do with a model that is gone."""
+        """Removes all wrenches and efforts on a deleted model."""
         self._wrenches = [each for each in self._wrenches if each.link.model != model]
         self._efforts = [each for each in self._efforts if each.joint.model != model]
 
     def apply(self, time_ns: int, bodies: Mapping[str, SimulatedBody]) -> None:
-        """Lets everything act that is due in the step that begins now.
+        """Applies all forces that are due in the step that begins now.
 
         Args:
-            time_ns: Simulated time at the beginning of the step [ns].
-            bodies: The models by name.
+            time_ns: Simulated time at the start of the step [ns].
+            bodies: Models by name.
         """
         if not self.pending:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mass of a link as the engine has it, and forces on it."""
+"""Mass properties of links in the engine, and forces on links."""
 
 from __future__ import annotations
 
@@ -14,20 +14,26 @@ from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 
 def tree_with_link(body: SimulatedBody, link: str) -> SimulatedBody:
-    """Returns the tree of a model that a link belongs to.
+    """Returns the tree of a model that contains a link.
 
     Raises:
-        UnknownEntityError: The model has no such link of its own; a static model is one link for the engine.
+        UnknownEntityError: No tree of the model contains the link; a static model is a single link in the engine.
     """
     tree = body.part_of(link)
     if link not in tree.link_indices:
         known = [name for each in body.parts for name in each.link_indices]
-        raise UnknownEntityError("link that moves", f"{body.name}::{link}", known)
+        raise UnknownEntityError("movable link", f"{body.name}::{link}", known)
     return tree
 
 
 def centre_in_world(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Pose:
-    """Returns the centre of mass of a link with its axes of inertia, in the world frame."""
+    """Returns the pose of a link's centre of mass with its inertia axes, in the world frame.
+
+    Args:
+        engine: The physics engine.
+        body: The model.
+        link: Name of the link.
+    """
     tree = tree_with_link(body, link)
     index = tree.link_indices[link]
     if index == BASE_INDEX:
@@ -36,7 +42,13 @@ def centre_in_world(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Po
 
 
 def link_mass(engine: PhysicsEngine, body: SimulatedBody, link: str) -> float:
-    """Returns the mass of a link [kg]; the engine has 0 for one that is fastened to the world."""
+    """Returns the mass of a link [kg]; 0 for a link that is fixed to the world.
+
+    Args:
+        engine: The physics engine.
+        body: The model.
+        link: Name of the link.
+    """
     return _mass_properties(engine, body, link).mass
 
 
@@ -46,24 +58,37 @@ def _mass_properties(engine: PhysicsEngine, body: SimulatedBody, link: str) -> M
 
 
 def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Inertial:
-    """Returns mass, centre of mass and inertia of a link; the axes of the inertia are those of the link frame.
+    """Returns mass, centre of mass and inertia of a link, with the inertia axes parallel to the link frame.
 
-    What is fastened to the world has no mass in the engine: there the description decides.
+    A link that is fixed to the world has no mass in the engine; the values of the description are returned.
+
+    Args:
+        engine: The physics engine.
+        body: The model.
+        link: Name of the link.
     """
     described = None
     if body.spec is not None:
         described = next((each.inertial for each in body.spec.links if each.name == link), None)
     if body.static and body.spec is not None:
         return described or Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))  # SDF's defaults
-    present = _mass_properties(engine, body, link)
-    if present.mass == 0.0 and described is not None:
+    current = _mass_properties(engine, body, link)
+    if current.mass == 0.0 and described is not None:
         return described
     centre = body.link_state(link).pose.inverse() @ centre_in_world(engine, body, link)
-    return Inertial(Pose(centre.position), present.mass, _rotated(present.moments, centre))
+    return Inertial(Pose(centre.position), current.mass, _rotated(current.moments, centre))
 
 
 def _rotated(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, float, float]:
-    """Returns ixx, ixy, ixz, iyy, iyz, izz of principal moments about the axes of a frame."""
+    """Rotates a diagonal inertia tensor.
+
+    Args:
+        moments: Moments about the axes of the frame [kg m^2].
+        axes: Pose of the frame, of which only the rotation is used.
+
+    Returns:
+        Elements ixx, ixy, ixz, iyy, iyz, izz of the rotated tensor [kg m^2].
+    """
     units = [rotate_vector(axes.quaternion, unit) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
 
     def element(row: int, column: int) -> float:
@@ -73,30 +98,33 @@ def _rotated(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, 
 
 
 def apply_wrench(engine: PhysicsEngine, body: SimulatedBody, link: str, force: Vector3, torque: Vector3) -> None:
-    """Lets a force and a torque act on a link in the coming physics step.
+    """Applies a force and a torque to a link in the next physics step.
 
-    PyBullet's function for torques mistakes the frame of some links, so a torque is applied as two forces.
+    PyBullet's function for torques uses the wrong frame for some links, so the torque is applied as a force couple.
 
     Args:
-        engine: Where the body lives.
+        engine: The physics engine.
         body: The model.
-        link: Its link.
-        force: At the centre of mass, in the world frame [N].
-        torque: In the world frame [Nm].
+        link: Name of the link.
+        force: Force at the centre of mass, in the world frame [N].
+        torque: Torque in the world frame [Nm].
     """
     tree, centre = tree_with_link(body, link), centre_in_world(engine, body, link).position
-    parts: list[tuple[Vector3, Vector3]] = [(centre, force)]
+    forces: list[tuple[Vector3, Vector3]] = [(centre, force)]
     if torque != (0.0, 0.0, 0.0):
-        arm, pull = couple(torque)
-        parts += [(_sum(centre, arm, 0.5), pull), (_sum(centre, arm, -0.5), (-pull[0], -pull[1], -pull[2]))]
-    for point, push in parts:
-        engine.apply_force(tree.number, tree.link_indices[link], push, point)
+        arm, force_at_arm = couple(torque)
+        forces += [
+            (_sum(centre, arm, 0.5), force_at_arm),
+            (_sum(centre, arm, -0.5), (-force_at_arm[0], -force_at_arm[1], -force_at_arm[2])),
+        ]
+    for point, partial_force in forces:
+        engine.apply_force(tree.number, tree.link_indices[link], partial_force, point)
 
 
 def couple(torque: Vector3) -> tuple[Vector3, Vector3]:
-    """Returns an arm of 1 m across a torque [Nm], and the force [N] that has this torque at its end."""
-    flattest = min(range(3), key=lambda index: abs(torque[index]))
-    across = cross(torque, (float(flattest == 0), float(flattest == 1), float(flattest == 2)))
+    """Returns a lever arm of 1 m perpendicular to a torque [Nm], and the force [N] that gives the torque at its end."""
+    smallest_axis = min(range(3), key=lambda index: abs(torque[index]))
+    across = cross(torque, (float(smallest_axis == 0), float(smallest_axis == 1), float(smallest_axis == 2)))
     length = math.hypot(*across)
     arm = (across[0] / length, across[1] / length, across[2] / length)
     return arm, cross(torque, arm)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a model as the URDF the physics engine loads.
+"""Writes a model as URDF for the physics engine.
 
-The engine's URDF loader handles inertia tensors, compounds of shapes, joint limits and meshes in one call, which its
-function interface does not. A static model becomes one link that carries the shapes of all its links.
+The engine's URDF loader supports inertia tensors, compound shapes, joint limits and meshes in one call, unlike its
+function interface. A static model becomes a single link with the shapes of all its links.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from modular_framework_simulation.models.solid_inertia import along_principal_ax
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_urdf.rotations import rpy_from_quaternion
 
-_FARTHEST = 1e3
-"""Stands for no limit on one side of a joint, and for a slide without limits [rad or m]."""
+_NO_LIMIT = 1e3
+"""Replacement for a missing limit of a joint with one limit, or of a prismatic joint [rad or m]."""
 
 STATIC_LINK = "static"
-"""Name of the one link of a static model in the written URDF."""
+"""Name of the single link of a static model in the URDF."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodyUrdf:
-    """A model as a URDF for the engine.
+    """Model as URDF for the engine.
 
     Attributes:
-        text: The URDF.
+        text: URDF text.
         root_in_model: Pose of the URDF's root link in the model frame.
-        fixed: Whether the root link is fastened to the world.
-        frame_in_link: Pose of the URDF's frame of each link in the link's own frame.
-        further: The other trees of a model whose joints do not connect all its links.
+        fixed: Whether the root link is fixed to the world.
+        frame_in_link: Pose of the URDF's link frame in the model's link frame, by link name.
+        further: Other trees of a model whose joints do not connect all links.
     """
 
     text: str
@@ -48,16 +48,16 @@ class BodyUrdf:
 
 
 def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: bool, concave: bool = True) -> BodyUrdf:
-    """Translates a model.
+    """Converts a model to URDF.
 
     Args:
-        model: What to translate; its pose plays no role.
-        convex_parts: Cuts meshes for the engine.
-        with_visuals: Whether visual shapes are written, for a window.
-        concave: Whether meshes of a static model keep their shape; convex parts stand for them otherwise.
+        model: Description of the model; its pose has no effect.
+        convex_parts: Converter of meshes for the engine.
+        with_visuals: Whether to write visual shapes, for a window.
+        concave: Whether meshes of a static model are kept exactly; otherwise, convex parts replace them.
 
     Raises:
-        DescriptionError: A mesh cannot be used.
+        DescriptionError: A mesh is unsupported or invalid.
     """
     writer = _Writer(convex_parts, with_visuals)
     if model.static:
@@ -69,7 +69,7 @@ def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: b
 
 
 def _tree_to_urdf(model: specs.Model, tree: JointTree, writer: _Writer) -> BodyUrdf:
-    # URDF puts a link's frame at the joint above it, SDF anywhere; `frame_in_link` is the transform between the two.
+    # A URDF link frame is at the parent joint, an SDF link frame is arbitrary; `frame_in_link` is their transform.
     frame_in_link = {name: Pose() for name in (specs.WORLD, *tree.links)}
     frame_in_link.update({joint.child: joint.pose for joint in tree.joints})
     poses = {link.name: link.pose for link in model.links} | {specs.WORLD: Pose()}
@@ -92,16 +92,22 @@ class _Writer:
         self._with_visuals = with_visuals
 
     def shapes(self, link: specs.Link, shift: Pose, exact: bool) -> str:
-        """Writes the shapes of a link, moved by `shift` into the frame of the URDF link."""
+        """Writes the shapes of a link.
+
+        Args:
+            link: The link.
+            shift: Pose of the link frame in the URDF's link frame.
+            exact: Whether meshes keep their exact triangles.
+        """
         text = ""
         for collision in link.collisions:
             for geometry, attributes in self._collision_geometries(collision.geometry, exact):
                 text += f"<collision{attributes}>{_origin(shift @ collision.pose)}{geometry}</collision>"
         if self._with_visuals:
-            for number, visual in enumerate(link.visuals):
+            for index, visual in enumerate(link.visuals):
                 for part, (geometry, colour) in enumerate(self._visual_geometries(visual)):
                     rgba = " ".join(f"{value:g}" for value in colour)
-                    material = f'<material name={quoteattr(f"{link.name}_{number}_{part}")}><color rgba="{rgba}"/>'
+                    material = f'<material name={quoteattr(f"{link.name}_{index}_{part}")}><color rgba="{rgba}"/>'
                     text += f"<visual>{_origin(shift @ visual.pose)}{geometry}{material}</material></visual>"
         return text
 
@@ -111,11 +117,16 @@ class _Writer:
         return [(_geometry(visual.geometry), visual.colour)]
 
     def inertial(self, link: specs.Link, shift: Pose) -> str:
-        """Writes the mass properties of a link."""
+        """Writes the mass properties of a link.
+
+        Args:
+            link: The link.
+            shift: Pose of the link frame in the URDF's link frame.
+        """
         inertial = link.inertial or specs.Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
         if is_impossible(
             principal_moments(inertial.inertia)
-        ):  # the engine takes moments of such a link, but no products
+        ):  # the engine accepts the moments of such a link, but no products of inertia
             inertial = along_principal_axes(inertial)
         names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         moments = " ".join(f'{name}="{value!r}"' for name, value in zip(names, inertial.inertia, strict=True))
@@ -143,7 +154,7 @@ def _joint(joint: specs.Joint, pose_in_parent: Pose) -> str:
         if kind == "revolute" and not (math.isfinite(lower) or math.isfinite(upper)):
             kind = "continuous"
         else:
-            bounds = (max(lower, -_FARTHEST), min(upper, _FARTHEST))
+            bounds = (max(lower, -_NO_LIMIT), min(upper, _NO_LIMIT))
             limit = f'<limit lower="{bounds[0]!r}" upper="{bounds[1]!r}" effort="0" velocity="100"/>'
     axis = " ".join(repr(value) for value in joint.axis)
     return (

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An object in a gripper, which moves with the hand along its arc and not along the tangent.
+"""Moves a held object with the gripper along the gripper's arc instead of the tangent.
 
-In a step h the engine moves the links of a robot by turning their joints, so along arcs; a free body goes on straight
-with its velocity. Friction only makes the velocities equal: in a hand with the acceleration a, an object falls behind
-by a h^2 / 2 in every step. That is half a millimetre a second in a hand that turns with 1 rad/s half a metre from the
-axis. Here the object is moved by just that difference, which is known: where a point of the hand would be along its
-tangent, and where it is. Its velocity is left alone, so that nothing holds it but friction.
+In a step h, the engine moves the links of a robot by rotating their joints, so the links move along arcs. A free body
+moves along a straight line. Friction only equalizes the velocities: in a gripper with the acceleration a, an object
+lags by a h^2 / 2 in every step. The lag is half a millimetre per second if the gripper rotates at 1 rad/s at a distance
+of half a metre from the axis. This module shifts the object by the known difference between the tangent and the actual
+path. The velocity of the object does not change, so only friction holds the object.
 """
 
 from __future__ import annotations
@@ -19,44 +19,48 @@ from modular_framework_urdf.rotations import Quaternion, Vector3
 
 
 class CarriedObject:
-    """Moves one object with one hand.
+    """Moves a held object with a gripper.
 
     Args:
-        engine: Where both are.
-        thing: The object.
-        robot: The robot that holds it.
-        palm_index: The engine's number of the link that the fingers are fastened to.
+        engine: The physics engine.
+        held_object: The held object.
+        robot: The robot that holds the object.
+        palm_index: Engine link index of the palm.
     """
 
-    def __init__(self, engine: PhysicsEngine, thing: SimulatedBody, robot: SimulatedBody, palm_index: int) -> None:
-        self._engine, self._thing, self._robot, self._palm = engine, thing.number, robot.number, palm_index
-        self._thing_in_palm = Pose()
-        self._before = Pose()
+    def __init__(
+        self, engine: PhysicsEngine, held_object: SimulatedBody, robot: SimulatedBody, palm_index: int
+    ) -> None:
+        self._engine, self._object_id, self._robot_id, self._palm = engine, held_object.number, robot.number, palm_index
+        self._object_in_palm = Pose()
+        self._object_before = Pose()
         self._palm_before = Pose()
 
     def before_step(self) -> None:
-        """Remembers where hand and object are."""
-        self._palm_before = self._engine.link_motion(self._robot, self._palm).centre
-        self._before = self._engine.base_centre(self._thing)
-        self._thing_in_palm = self._palm_before.inverse() @ self._before
+        """Stores the poses of the palm and the object."""
+        self._palm_before = self._engine.link_motion(self._robot_id, self._palm).centre
+        self._object_before = self._engine.base_centre(self._object_id)
+        self._object_in_palm = self._palm_before.inverse() @ self._object_before
 
     def after_step(self) -> None:
-        """Moves the object by what the hand's motion differs from its tangent."""
-        palm, _, linear, angular = self._engine.link_motion(self._robot, self._palm)
-        carried = palm @ self._thing_in_palm
+        """Shifts the object by the difference between the palm's path and its tangent."""
+        palm, _, linear, angular = self._engine.link_motion(self._robot_id, self._palm)
+        carried = palm @ self._object_in_palm
         lever = _difference(carried.position, palm.position)
         step_s = self._engine.settings.time_step_s
-        # This is the velocity at the end of the step: to second order, the tangent there goes beyond the arc by as much
-        # as the tangent at the beginning, along which the object went, falls short of it.
+        # The velocity is the velocity at the end of the step. To second order, its tangent exceeds the arc by the same
+        # distance by which the tangent at the start, along which the object moved, falls short.
         tangent = [step_s * (v + w) for v, w in zip(linear, cross(angular, lever), strict=True)]
-        shift = _difference((tangent[0], tangent[1], tangent[2]), _difference(carried.position, self._before.position))
-        turned = _rotation_vector((palm @ self._palm_before.inverse()).quaternion)
-        turn = _difference((step_s * angular[0], step_s * angular[1], step_s * angular[2]), turned)
-        pose, twist = self._engine.base_centre(self._thing), self._engine.base_twist(self._thing)
+        shift = _difference(
+            (tangent[0], tangent[1], tangent[2]), _difference(carried.position, self._object_before.position)
+        )
+        palm_rotation = _rotation_vector((palm @ self._palm_before.inverse()).quaternion)
+        rotation_error = _difference((step_s * angular[0], step_s * angular[1], step_s * angular[2]), palm_rotation)
+        pose, twist = self._engine.base_centre(self._object_id), self._engine.base_twist(self._object_id)
         x, y, z = (a + b for a, b in zip(pose.position, shift, strict=True))
-        rotated = Pose((0.0, 0.0, 0.0), _small_rotation(turn)) @ Pose((0.0, 0.0, 0.0), pose.quaternion)
-        self._engine.set_base_centre(self._thing, Pose((x, y, z), rotated.quaternion))
-        self._engine.set_base_twist(self._thing, *twist)  # the line above sets it to 0
+        rotated = Pose((0.0, 0.0, 0.0), _small_rotation(rotation_error)) @ Pose((0.0, 0.0, 0.0), pose.quaternion)
+        self._engine.set_base_centre(self._object_id, Pose((x, y, z), rotated.quaternion))
+        self._engine.set_base_twist(self._object_id, *twist)  # set_base_centre has reset the velocity
 
 
 def _difference(a: Vector3, b: Vector3) -> Vector3:

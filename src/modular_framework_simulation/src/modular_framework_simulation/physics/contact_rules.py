@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets the smaller coefficient of the two surfaces of a contact count, as in Gazebo's engine; PyBullet multiplies them.
+"""Makes PyBullet use the smaller friction and restitution coefficient of a contact, as Gazebo's engine does.
 
-Bullet calls a function through a pointer that an application may change (PR 1383 of bullet3). PyBullet has no call for
-that, and the linker hides the pointer, so its address is looked up in the symbol table of the loaded library. The
-function gets two collision objects. Where these keep their coefficients is found by letting two spheres with known ones
-touch, so that nothing here depends on a version or a processor. A library without a symbol table cannot be changed:
-the caller then has to give every surface the square root of its coefficient, which is right between equal surfaces.
+By default, PyBullet multiplies the two coefficients. Bullet calls the combining function through a pointer that an
+application may change (PR 1383 of bullet3). PyBullet does not provide a call for this change, and the linker hides the
+pointer, so its address is looked up in the symbol table of the loaded library. The function receives two collision
+objects. A test contact of two spheres with known coefficients reveals the memory location of the coefficients in these
+objects, so the change does not depend on the version or the processor. A library without a symbol table cannot be
+changed. The caller must then set the square root of each coefficient, which is exact for equal surfaces.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 _FRICTION_POINTER = "gCalculateCombinedFrictionCallback"
 _RESTITUTION_POINTER = "gCalculateCombinedRestitutionCallback"
 _EXPORTED = "b3ChangeDynamicsInfoSetLateralFriction"
-"""A function that the dynamic linker knows, too: it shows where the library was loaded."""
+"""Function that is also visible to the dynamic linker, and therefore reveals the load address of the library."""
 
 _ELF_64 = b"\x7fELF\x02"
 _SYMBOL_TABLE = 2
@@ -36,21 +37,21 @@ _SYMBOL = np.dtype(
 )
 
 _SEARCHED_BYTES = 512
-"""Of a collision object, which is larger."""
+"""Size of the searched memory of a collision object, which is larger."""
 _KNOWN_FRICTION, _KNOWN_RESTITUTION = 0.31415926, 0.27182818
 
 _Combine = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
 
 
 @functools.cache
-def let_smaller_coefficient_count(api: Any) -> bool:
-    """Changes how the engine combines friction and restitution, for all worlds of this process.
+def use_smaller_coefficients(api: Any) -> bool:
+    """Makes the engine combine friction and restitution by the minimum, for all worlds of this process.
 
     Args:
         api: The module pybullet.
 
     Returns:
-        Whether it could be changed.
+        Whether the change was possible.
     """
     library = Path(api.__file__)
     values = _symbol_values(library, (_FRICTION_POINTER, _RESTITUTION_POINTER, _EXPORTED))
@@ -61,23 +62,23 @@ def let_smaller_coefficient_count(api: Any) -> bool:
         ctypes.c_void_p.from_address(exported - values[_EXPORTED] + values[name])
         for name in (_FRICTION_POINTER, _RESTITUTION_POINTER)
     )
-    contents = _contents_of_touched_object(api, friction)
+    contents = _object_memory(api, friction)
     for pointer, known in ((friction, _KNOWN_FRICTION), (restitution, _KNOWN_RESTITUTION)):
-        place = contents.find(struct.pack("d", known))
-        if place < 0 or place % 8:
+        offset = contents.find(struct.pack("d", known))
+        if offset < 0 or offset % 8:
             return False
-        pointer.value = _compiled_minimum(place // 8)
+        pointer.value = _compiled_minimum(offset // 8)
     return True
 
 
 def _symbol_values(library: Path, names: Sequence[str]) -> dict[str, int] | None:
-    """Returns the addresses of symbols relative to where an ELF library is loaded, or None if they are not there."""
+    """Returns the addresses of symbols relative to the load address of an ELF library; None if a symbol is missing."""
     with library.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:5] != _ELF_64:
             return None
-        (sections_at,) = struct.unpack_from("Q", data, 0x28)
+        (section_offset,) = struct.unpack_from("Q", data, 0x28)
         (count,) = struct.unpack_from("H", data, 0x3C)
-        sections = np.frombuffer(data[sections_at : sections_at + count * _SECTION.itemsize], _SECTION)
+        sections = np.frombuffer(data[section_offset : section_offset + count * _SECTION.itemsize], _SECTION)
         tables = sections[sections["type"] == _SYMBOL_TABLE]
         if len(tables) != 1:
             return None
@@ -87,23 +88,23 @@ def _symbol_values(library: Path, names: Sequence[str]) -> dict[str, int] | None
         begin, end = int(text["offset"]), int(text["offset"] + text["size"])
         values = {}
         for name in names:
-            place = data.find(b"\0" + name.encode() + b"\0", begin, end) + 1 - begin
-            found = symbols[symbols["name"] == place]
+            offset = data.find(b"\0" + name.encode() + b"\0", begin, end) + 1 - begin
+            found = symbols[symbols["name"] == offset]
             if len(found) != 1:
                 return None
             values[name] = int(found[0]["value"])
         return values
 
 
-def _contents_of_touched_object(api: Any, friction: ctypes.c_void_p) -> bytes:
-    """Returns the first bytes of a collision object that has the known coefficients."""
-    seen: list[bytes] = []
+def _object_memory(api: Any, friction: ctypes.c_void_p) -> bytes:
+    """Returns the first bytes of a collision object with the known coefficients."""
+    memory: list[bytes] = []
 
-    def look(first: int, second: int) -> float:
-        seen.extend(ctypes.string_at(each, _SEARCHED_BYTES) for each in (first, second))
+    def record(first: int, second: int) -> float:
+        memory.extend(ctypes.string_at(each, _SEARCHED_BYTES) for each in (first, second))
         return 0.0
 
-    callback, before = _Combine(look), friction.value
+    callback, original = _Combine(record), friction.value
     client = api.connect(api.DIRECT)
     friction.value = ctypes.cast(callback, ctypes.c_void_p).value
     try:
@@ -115,18 +116,18 @@ def _contents_of_touched_object(api: Any, friction: ctypes.c_void_p) -> bytes:
             )
         api.stepSimulation(physicsClientId=client)
     finally:
-        friction.value = before
+        friction.value = original
         api.disconnect(client)
-    return seen[0] if seen else b""
+    return memory[0] if memory else b""
 
 
-_kept: list[Any] = []
-"""Compiled functions that the engine calls; they must not be collected."""
+_compiled_functions: list[Any] = []
+"""Compiled functions that the engine calls; the references prevent garbage collection."""
 
 
 def _compiled_minimum(index: int) -> int:
-    """Returns the address of a compiled function: the smaller of the numbers at an index of two arrays."""
-    import numba  # half a second that only a simulation pays
+    """Compiles the minimum of the elements at an index of two arrays, and returns the address of the function."""
+    import numba  # takes half a second, so only simulations import this module
 
     types: Any = numba.types
     numbers = types.CPointer(types.float64)
@@ -135,5 +136,5 @@ def _compiled_minimum(index: int) -> int:
     def minimum(first: Any, second: Any) -> Any:
         return min(first[index], second[index])
 
-    _kept.append(minimum)
+    _compiled_functions.append(minimum)
     return int(minimum.address or 0)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets cylinders roll in PyBullet, which finds one touch of a round shape in a step.
+"""Makes cylinders roll in PyBullet, which finds only one new contact point of a round shape per step.
 
-A cylinder that lies on a table touches it along a line. The engine finds one end of the line in one step, the other end
-in the next one, and keeps the touch of the step before, which by then has moved backwards: its push speeds the cylinder
-up. A thin disc at each end touches in one point, which is found in each step. The cylinder itself is a little thinner.
+A lying cylinder touches a table along a line. The engine finds one end of the line in one step and the other end in the
+next step. The engine keeps the contact of the previous step, which has moved backwards meanwhile and accelerates the
+cylinder. A thin disc at each end has a single contact point, which the engine finds in every step. The cylinder between
+the discs is slightly thinner.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_urdf import xml_text
 
 _CORE_RADIUS = 0.999
-"""Radius of what is between the discs, of the radius of the cylinder: more than the discs sink in."""
+"""Ratio of the radius between the discs to the cylinder radius; the gap exceeds the penetration of the discs."""
 _THICKNESS = 0.01
-"""Thickness of a disc, of its radius."""
+"""Ratio of a disc's thickness to its radius."""
 
 
 def with_rims(text: str, name: str) -> str:
-    """Returns a URDF in which each cylinder of a collision has a disc at both ends.
+    """Adds a disc at both ends of each collision cylinder in a URDF.
 
     Args:
-        text: The URDF.
-        name: What to call it in messages.
+        text: URDF text.
+        name: Name of the URDF in messages.
     """
     if "<cylinder" not in text:
         return text

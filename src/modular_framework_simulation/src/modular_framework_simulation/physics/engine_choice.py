@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The physics engines there are, by name; each is imported when it is chosen."""
+"""Physics engines by name; an engine is only imported if selected."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from modular_framework_urdf.rotations import Vector3
 PYBULLET = "pybullet"
 MUJOCO = "mujoco"
 ENGINES = (PYBULLET, MUJOCO)
-"""Names of the engines, the default first."""
+"""Names of the engines, starting with the default."""
 
 
 def make_engine(name: str, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> PhysicsEngine:
-    """Returns an engine with nothing in it.
+    """Creates an empty engine.
 
     Args:
-        name: One of `ENGINES`.
-        settings: Its numbers.
-        gravity: [m/s^2]
-        gui: Whether to open a window, if the engine has one and there is a display; a log line says if not.
-        log: Takes lines of text about what was decided.
+        name: Name in `ENGINES`.
+        settings: Settings of the physics engine.
+        gravity: Gravity vector in the world frame [m/s^2].
+        gui: Whether to open a window; a missing window or display is logged.
+        log: Function that logs a decision.
 
     Raises:
-        SimulationError: There is no such engine, or it is not installed.
+        SimulationError: The engine is unknown or not installed.
     """
     match name:
         case "pybullet":
@@ -37,8 +37,8 @@ def make_engine(name: str, settings: PhysicsSettings, gravity: Vector3, gui: boo
                 from modular_framework_simulation.physics.mujoco_engine import MujocoEngine
             except ModuleNotFoundError as error:
                 raise SimulationError(
-                    f"physics engine 'mujoco': {error}; install the package mujoco of requirements.txt, or choose "
+                    f"physics engine 'mujoco': {error}; install the package mujoco of requirements.txt, or select "
                     "'pybullet'"
                 ) from error
             return MujocoEngine(settings, gravity, gui, log)
-    raise SimulationError(f"physics engine '{name}': there is no such engine; allowed: {', '.join(ENGINES)}")
+    raise SimulationError(f"physics engine '{name}' is unknown; allowed: {', '.join(ENGINES)}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives the joints of a body in the engine the damping and the friction of their description."""
+"""Sets damping and friction of joints in the engine as specified in a description."""
 
 from __future__ import annotations
 
@@ -13,54 +13,55 @@ from modular_framework_simulation.models.sdf_specs import JointDynamics
 from modular_framework_simulation.physics.physics_engine import PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
-_LARGEST_SHARE = 0.5
-"""Of its velocity that a joint may lose in one step: even where the pose of the other joints lets it become four times
-easier to move than at the start, the engine's explicit integration is stable."""
+_MAX_LOSS_FRACTION = 0.5
+"""Maximum fraction of velocity that damping removes in one step; the engine's explicit integration then remains stable,
+even if a change of the pose reduces the inertia of a joint to a quarter."""
 
 
 def set_joint_resistance(engine: PhysicsEngine, body: SimulatedBody, dynamics: Mapping[str, JointDynamics]) -> None:
-    """Sets damping and friction of all movable joints; those that are not named get none.
+    """Sets damping and friction of all movable joints; joints without an entry have none.
 
     Args:
-        engine: Where the body is.
-        body: Its joints are where they start.
-        dynamics: By the name of the joint; springs are not the engine's, see `body_forces`.
+        engine: The physics engine.
+        body: The body, with its joints at their initial positions.
+        dynamics: Dynamics by joint name; the engine has no springs, see `body_forces`.
     """
-    wanted = {name: dynamics[name].damping for name in body.joint_indices if name in dynamics}
-    damping = stable_damping(engine, body, wanted) if any(wanted.values()) else {}
+    described = {name: dynamics[name].damping for name in body.joint_indices if name in dynamics}
+    damping = stable_damping(engine, body, described) if any(described.values()) else {}
     for name, index in body.joint_indices.items():
         engine.set_joint_damping(body.number, index, damping.get(name, 0.0))
-        # Coulomb friction is a motor that holds the joint as strongly as that. Without one, PyBullet's own would.
+        # A motor with this maximum effort acts as Coulomb friction; without it, PyBullet's default motor would brake.
         engine.set_velocity_motor(body.number, index, 0.0, dynamics[name].friction if name in dynamics else 0.0)
 
 
 def stable_damping(engine: PhysicsEngine, body: SimulatedBody, damping: Mapping[str, float]) -> dict[str, float]:
-    """Returns the damping with which the engine's explicit steps end at the velocity of the continuous motion.
+    """Returns damping values for which the engine's explicit steps have the velocities of the continuous motion.
 
-    A step takes the share d' h / I of the velocity, and has to take 1 - exp(-d h / I); d' is the damping that does.
-    Where many strong ones together would take more than `_LARGEST_SHARE`, all are weakened alike.
+    An explicit step removes the fraction d' h / I of the velocity; the exact fraction is 1 - exp(-d h / I), which
+    defines d'. If the damping of all joints together removes more than `_MAX_LOSS_FRACTION`, all values are reduced.
 
     Args:
-        engine: Where the body is.
-        body: Its joints are where they start.
-        damping: As described [N m s/rad or N s/m], by the name of the joint.
+        engine: The physics engine.
+        body: The body, with its joints at their initial positions.
+        damping: Damping values of the description [N m s/rad or N s/m], by joint name.
     """
     step_s = engine.settings.time_step_s
     names = list(body.joint_indices)
     inverse = inverse_mass_matrix(engine, body)
-    wanted = np.array([damping.get(name, 0.0) for name in names])
+    described = np.array([damping.get(name, 0.0) for name in names])
     mobility = np.diag(inverse) * step_s
-    exact = np.array([-math.expm1(-d * m) / m if d * m > 0.0 else d for d, m in zip(wanted, mobility, strict=True)])
+    exact = np.array([-math.expm1(-d * m) / m if d * m > 0.0 else d for d, m in zip(described, mobility, strict=True)])
     roots = np.sqrt(exact)
     largest = float(np.linalg.eigvalsh(roots[:, None] * inverse * roots * step_s).max())
-    exact *= min(1.0, _LARGEST_SHARE / largest) if largest > 0.0 else 1.0
+    exact *= min(1.0, _MAX_LOSS_FRACTION / largest) if largest > 0.0 else 1.0
     return dict(zip(names, exact.tolist(), strict=True))
 
 
 def inverse_mass_matrix(engine: PhysicsEngine, body: SimulatedBody) -> npt.NDArray[np.float64]:
-    """Returns how the movable joints answer to forces on them [1/(kg m^2) or 1/kg], where the joints are now.
+    """Returns the joint accelerations per effort [1/(kg m^2) or 1/kg] at the current joint positions, shape (n, n).
 
-    Zeros for a body with ball joints, whose mass matrix the engine does not give: what depends on it is as described.
+    A body with ball joints has zeros, because the engine does not provide its mass matrix; its damping is then used
+    as described.
     """
     indices = list(body.joint_indices.values())
     if body.ball_joint_indices:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes of models that requests ask for while the world runs: state and mass of a link, settings of a joint.
+"""Applies changes of models on request at run time: state and mass of a link, settings of a joint.
 
-What the engine cannot change in a body it gets by a new body in the state of the old one, made from the description
-with the change in it.
+Properties that the engine cannot change are changed in the description. A new body in the state of the old body then
+replaces the old body.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from modular_framework_simulation.physics.simulated_body import (
     twist_at,
 )
 
-_SAME = 1e-6
-"""Relative difference below which a number of a request is the present one: it may have been printed and read."""
-_ROUNDING = 1e-9
-"""How far a joint may be beyond a limit, or from where it was put [rad or m]."""
+_RELATIVE_TOLERANCE = 1e-6
+"""Relative tolerance of equal values, because values of a request may have been printed and parsed."""
+_POSITION_TOLERANCE = 1e-9
+"""Tolerance of joint positions and limits [rad or m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointChange:
-    """New settings of a joint; None leaves one as it is.
+    """New settings of a joint; None values are not changed.
 
     Attributes:
-        lower: Lower limit, -inf for none [rad or m].
-        upper: Upper limit, inf for none [rad or m].
+        lower: Lower limit, or -inf [rad or m].
+        upper: Upper limit, or inf [rad or m].
         settings: Damping and motor.
     """
 
@@ -51,12 +51,12 @@ class JointChange:
 
 
 def set_link_state(world: PhysicsWorld, link: PartName, state: BodyState, reference: str) -> None:
-    """Puts a link somewhere, and with it the rest of its model, whose joints keep their positions, at rest.
+    """Sets the state of a link; its model moves as a rigid body, with its joints at rest.
 
     Args:
         world: The world.
-        link: The link.
-        state: Of the link, seen from the reference.
+        link: Name of the link.
+        state: State of the link relative to the reference.
         reference: Model, "model::link", or the world.
 
     Raises:
@@ -64,43 +64,43 @@ def set_link_state(world: PhysicsWorld, link: PartName, state: BodyState, refere
         ModelChangeError: The link belongs to the robot.
     """
     body = world.body(link.model)
-    _require_model(body, "it stands where its description says; move its joints")
-    wanted = world.state_in_world(state, reference)
+    _require_model(body, "its base pose is fixed by its description; move its joints instead")
+    target = world.state_in_world(state, reference)
     body.set_joints(
         {name: measured_joint(world.engine, body, name).position for name in movable_joints(body)}  # at rest
     )
-    model_in_world = wanted.pose @ body.link_state(link.part).pose.inverse() @ body.state().pose
-    world.set_state(link.model, BodyState(model_in_world, twist_at(wanted.twist, wanted.pose, model_in_world)))
+    model_in_world = target.pose @ body.link_state(link.part).pose.inverse() @ body.state().pose
+    world.set_state(link.model, BodyState(model_in_world, twist_at(target.twist, target.pose, model_in_world)))
 
 
 def set_inertial(world: PhysicsWorld, link: PartName, inertial: specs.Inertial, gravity: bool = True) -> bool:
-    """Gives a link another mass, centre of mass, inertia and weight; the model goes on moving as it does.
+    """Sets mass, centre of mass, inertia and gravity of a link; the motion of the model continues.
 
     Args:
         world: The world.
-        link: The link.
-        inertial: The new values.
-        gravity: Whether gravity acts on it.
+        link: Name of the link.
+        inertial: New mass properties.
+        gravity: Whether gravity acts on the link.
 
     Returns:
-        Whether they differ from the present ones.
+        Whether the values have changed.
 
     Raises:
-        UnknownEntityError: There is no such link.
-        ModelChangeError: The link belongs to the robot or a static model, or no rigid body has such values.
+        UnknownEntityError: The link does not exist.
+        ModelChangeError: The link belongs to the robot or a static model, or no rigid body has these values.
     """
     body = world.body(link.model)
-    present = {each: measured_inertial(world.engine, body, each) for each in body.link_names()}
-    if _are_same(present[link.part], inertial) and has_weight(body, link.part) == gravity:
+    current = {each: measured_inertial(world.engine, body, each) for each in body.link_names()}
+    if _are_same(current[link.part], inertial) and has_weight(body, link.part) == gravity:
         return False
-    model = _require_model(body, "its masses are those of its description")
+    model = _require_model(body, "its masses are set by its description")
     if body.static:
-        raise ModelChangeError(f"model '{link.model}' is static: it has no mass that matters; spawn one that is not")
+        raise ModelChangeError(f"model '{link.model}' is static, so its mass has no effect; spawn a movable model")
     _require_rigid(link, inertial)
     links = tuple(
         replace(each, inertial=inertial, gravity=gravity)
         if each.name == link.part
-        else replace(each, inertial=present[each.name])
+        else replace(each, inertial=current[each.name])
         for each in model.links
     )
     _recreate(world, replace(model, links=links))
@@ -115,25 +115,30 @@ def has_weight(body: SimulatedBody, link: str) -> bool:
 def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None:
     """Changes settings of a joint.
 
+    Args:
+        world: The world.
+        joint: Name of the joint.
+        change: New settings.
+
     Raises:
-        UnknownEntityError: There is no such joint that moves.
-        ModelChangeError: The limits exclude each other, or the joint is one of the robot's, which has limits and
-            motors of its own.
+        UnknownEntityError: The joint does not exist or is not movable.
+        ModelChangeError: The lower limit is above the upper limit, or the joint belongs to the robot, which has its own
+            limits and motors.
     """
     body = world.body(joint.model)
     tree_with_joint(body, joint.part)
-    present = measured_joint(world.engine, body, joint.part)
+    current = measured_joint(world.engine, body, joint.part)
     if change.settings.motor_effort is not None:
         _require_model(body, "its motors belong to the controllers")
     if body.spec is None:
         if change.lower is not None or change.upper is not None:
-            _require_model(body, "the limits of its joints are those of its description")
+            _require_model(body, "its joint limits are set by its description")
     elif (change.lower, change.upper, change.settings.damping) != (None, None, None):
-        lower = present.lower if change.lower is None else change.lower
-        upper = present.upper if change.upper is None else change.upper
+        lower = current.lower if change.lower is None else change.lower
+        upper = current.upper if change.upper is None else change.upper
         if not lower <= upper:
             raise ModelChangeError(f"joint '{joint.scoped}': lower limit {lower:g} is above the upper limit {upper:g}")
-        damping = present.damping if change.settings.damping is None else change.settings.damping
+        damping = current.damping if change.settings.damping is None else change.settings.damping
         joints = tuple(
             replace(_limited(each, lower, upper), dynamics=replace(each.dynamics, damping=damping))
             if each.name == joint.part
@@ -146,23 +151,28 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
 
 
 def set_joint_positions(world: PhysicsWorld, model: str, positions: dict[str, float]) -> None:
-    """Puts joints of a model or robot at positions [rad or m], at rest, and sees to it that they are there.
+    """Sets joint positions of a model or robot, at rest, and checks the result.
+
+    Args:
+        world: The world.
+        model: Name of the model or robot.
+        positions: Positions by joint name [rad or m].
 
     Raises:
-        UnknownEntityError: There is no such model, or it has no such movable joint.
-        ModelChangeError: A position is beyond a limit, or a joint is not where it was put.
+        UnknownEntityError: The model or a movable joint does not exist.
+        ModelChangeError: A position exceeds a limit, or a joint does not keep its position.
     """
     body = world.body(model)
     for name, position in positions.items():
         joint = measured_joint(world.engine, body, name)
-        if not joint.lower - _ROUNDING <= position <= joint.upper + _ROUNDING:
-            allowed = f"allowed is {joint.lower:g} to {joint.upper:g} {_unit(joint)}"
+        if not joint.lower - _POSITION_TOLERANCE <= position <= joint.upper + _POSITION_TOLERANCE:
+            allowed = f"allowed: {joint.lower:g} to {joint.upper:g} {_unit(joint)}"
             raise ModelChangeError(f"joint '{model}::{name}': got {position:g}; {allowed}")
     body.set_joints(positions)
     for name, position in positions.items():
-        found = measured_joint(world.engine, body, name).position
-        if not abs(found - position) <= _ROUNDING + _SAME * abs(position):
-            raise ModelChangeError(f"joint '{model}::{name}' was put at {position:g} and is at {found:g}")
+        measured = measured_joint(world.engine, body, name).position
+        if not abs(measured - position) <= _POSITION_TOLERANCE + _RELATIVE_TOLERANCE * abs(position):
+            raise ModelChangeError(f"joint '{model}::{name}' was set to {position:g}, but is at {measured:g}")
     world.note_change()
 
 
@@ -172,35 +182,37 @@ def _unit(joint: JointMeasurement) -> str:
 
 def _require_model(body: SimulatedBody, reason: str) -> specs.Model:
     if body.spec is None:
-        raise ModelChangeError(f"'{body.name}' is the robot that the controllers drive: {reason}")
+        raise ModelChangeError(f"'{body.name}' is the controlled robot: {reason}")
     return body.spec
 
 
 def _are_same(a: specs.Inertial, b: specs.Inertial) -> bool:
     values = [(a.mass, b.mass), *zip(a.inertia, b.inertia, strict=True)]
-    largest = max(abs(x) for x in a.inertia)
-    alike = all(math.isclose(x, y, rel_tol=_SAME, abs_tol=_SAME * largest) for x, y in values)
+    max_moment = max(abs(x) for x in a.inertia)
+    alike = all(
+        math.isclose(x, y, rel_tol=_RELATIVE_TOLERANCE, abs_tol=_RELATIVE_TOLERANCE * max_moment) for x, y in values
+    )
     translation, rotation = a.pose.distance_to(b.pose)
-    return alike and translation <= _SAME and rotation <= 1e-3
+    return alike and translation <= _RELATIVE_TOLERANCE and rotation <= 1e-3
 
 
 def _require_rigid(link: PartName, inertial: specs.Inertial) -> None:
-    """Refuses what no distribution of mass has: the engine would compute nonsense from it."""
+    """Raises ModelChangeError for mass properties that no rigid body has, which the engine cannot simulate."""
     xx, xy, xz, yy, yz, zz = inertial.inertia
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     if inertial.mass <= 0.0:
-        raise ModelChangeError(f"link '{link.scoped}': mass is {inertial.mass:g} kg; allowed is more than 0")
+        raise ModelChangeError(f"link '{link.scoped}': mass is {inertial.mass:g} kg; allowed: more than 0")
     if min(xx, yy, zz) <= 0.0 or minor <= 0.0 or determinant <= 0.0:
         raise ModelChangeError(
-            f"link '{link.scoped}': the inertia {list(inertial.inertia)} is not positive definite; allowed is what "
-            "rigid bodies have: read it with get_link_properties, and scale it with the mass"
+            f"link '{link.scoped}': the inertia {list(inertial.inertia)} is not positive definite; allowed: an inertia "
+            "of a rigid body, for example the result of get_link_properties, scaled with the mass"
         )
 
 
 def _limited(joint: specs.Joint, lower: float, upper: float) -> specs.Joint:
-    turns = joint.kind in (specs.JointType.CONTINUOUS, specs.JointType.REVOLUTE)
-    return replace(joint, kind=specs.JointType.REVOLUTE if turns else joint.kind, lower=lower, upper=upper)
+    rotates = joint.kind in (specs.JointType.CONTINUOUS, specs.JointType.REVOLUTE)
+    return replace(joint, kind=specs.JointType.REVOLUTE if rotates else joint.kind, lower=lower, upper=upper)
 
 
 def _recreate(world: PhysicsWorld, model: specs.Model) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies for MuJoCo, read from the same URDF that PyBullet loads.
+"""Reads bodies for MuJoCo from the same URDF that PyBullet loads.
 
-The frame of a root link is put into its centre of mass, with the axes of its inertia: a body that flies freely then
-turns about that point without an error of integration. All other links keep the frame of their joint.
+The frame of a root link is moved to the centre of mass, along the inertia axes. A free body then rotates about this
+point without integration errors. All other links keep the frame of their joint.
 """
 
 from __future__ import annotations
@@ -43,28 +43,28 @@ _TYPES = {
     JointKind.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
     JointKind.BALL: mujoco.mjtJoint.mjJNT_BALL,
 }
-HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""Impedance of contacts, limits and motors: the hardest that MuJoCo has. What is left of it, forces of 0.01 % of those
-that would be needed to move the bodies as free ones, shows in no test."""
+HARDEST_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""Impedance of contacts, limits and motors: MuJoCo's maximum. The remaining softness, 0.01 % of the forces that would
+move the bodies freely, is not visible in any test."""
 
-REACH_M = 1e-3
-"""How far apart shapes are that may touch in the coming step [m]. A light finger whose motor pushes it crosses a tenth
-of this in a step; without a reach, it would hit what it holds again and again."""
+CONTACT_MARGIN_M = 1e-3
+"""Maximum distance of shapes that may touch in the next step [m]. A light finger driven by its motor moves by a tenth
+of this distance per step; without this margin, the finger would repeatedly hit the held object."""
 
-_LEAST_IMBALANCE = 1e-9
-"""By which share a moment of inertia may be larger than the sum of the others, for rounding."""
+_MOMENT_TOLERANCE = 1e-9
+"""Relative tolerance by which a moment of inertia may exceed the sum of the others, due to rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A collision shape.
+    """Collision shape.
 
     Attributes:
-        pose: In the frame of its link.
-        kind: Of MuJoCo.
-        size: As MuJoCo has it [m].
-        mesh: File with the points of a convex body, empty for others.
-        scale: Of those points.
+        pose: Pose in the frame of the link.
+        kind: MuJoCo's type of the shape.
+        size: MuJoCo's size parameters [m].
+        mesh: File with the vertices of a convex body; empty for other shapes.
+        scale: Scale factors of the vertices.
     """
 
     pose: Pose
@@ -76,16 +76,16 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link.
+    """Link of a body.
 
     Attributes:
-        name: In its description.
-        parent: Number of the link above it, -1: the root, None: it is the root.
-        pose: Of its frame in that of the link above.
-        mass: Its mass; 0 in a root that is fastened to the world.
-        shapes: That touch others.
-        joint: Above it; None for the root.
-        axis: Of that joint, in the frame of the link.
+        name: Name in the description.
+        parent: Index of the parent link, -1 for the root; None for the root itself.
+        pose: Pose of the link frame in the parent link's frame.
+        mass: Mass properties, with mass 0 for a fixed root.
+        shapes: Collision shapes.
+        joint: Joint to the parent link; None for the root.
+        axis: Axis of the joint in the link frame.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class BodyTree:
-    """A body: its root first, then the links by number, so that link i is at i + 1."""
+    """Links of a body: the root first, then the links by index, so that link i is at position i + 1."""
 
     name: str
     fixed: bool
@@ -111,34 +111,34 @@ def read_tree(text: str, name: str, fixed: bool, log: Log) -> BodyTree:
 
     Args:
         text: URDF with absolute mesh paths.
-        name: Named in errors.
-        fixed: Whether its root link is fastened to the world.
-        log: Takes a line about what is not as described.
+        name: Name of the model for error messages.
+        fixed: Whether the root link is fixed to the world.
+        log: Function that logs deviations from the description.
 
     Raises:
-        DescriptionError: It has what MuJoCo cannot represent.
+        DescriptionError: MuJoCo cannot represent the body.
     """
     root = xml_text.parse(text, f"model '{name}'")
     elements = {element.get("name", ""): element for element in root.findall("link")}
-    below: dict[str, list[Element]] = {}
+    child_joints: dict[str, list[Element]] = {}
     children = set()
     for joint in root.findall("joint"):
-        below.setdefault(joint.find("parent").get("link"), []).append(joint)
+        child_joints.setdefault(joint.find("parent").get("link"), []).append(joint)
         children.add(joint.find("child").get("link"))
     roots = [link for link in elements if link not in children]
     if len(roots) != 1:
-        raise DescriptionError(f"model '{name}'", f"has {len(roots)} root links: {roots}", "a body has one")
+        raise DescriptionError(f"model '{name}'", f"has {len(roots)} root links: {roots}", "expected one root link")
     links = [_link(elements[roots[0]], name, None, Pose(), None, (0.0, 0.0, 1.0), log)]
     if fixed:
         links[0] = replace(links[0], mass=links[0].mass._replace(mass=0.0))
-    ahead = [(joint, BASE_INDEX) for joint in reversed(below.get(roots[0], []))]
-    while ahead:
-        element, parent = ahead.pop()
+    pending = [(joint, BASE_INDEX) for joint in reversed(child_joints.get(roots[0], []))]
+    while pending:
+        element, parent = pending.pop()
         child, index = element.find("child").get("link"), len(links) - 1
         x, y, z = _numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0))
         joint = _joint(element, index, name)
         links.append(_link(elements[child], name, parent, _origin(element), joint, (x, y, z), log))
-        ahead += [(each, index) for each in reversed(below.get(child, []))]
+        pending += [(each, index) for each in reversed(child_joints.get(child, []))]
     return BodyTree(name, fixed, tuple(links))
 
 
@@ -177,20 +177,20 @@ def _link(
 
 
 def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
-    if inertial is None:  # only a root that is fastened to the world has none
+    if inertial is None:  # only a root that is fixed to the world has no inertia
         return MassProperties(0.0, (0.0, 0.0, 0.0), Pose())
     record = inertial.find("inertia")
     xx, xy, xz, yy, yz, zz = (float(record.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     mass = float(inertial.find("mass").get("value"))
-    turned = along_principal_axes(Inertial(_origin(inertial), mass, (xx, xy, xz, yy, yz, zz)))
-    moments = turned.inertia[0], turned.inertia[3], turned.inertia[5]
-    if is_impossible(moments, _LEAST_IMBALANCE):
+    principal = along_principal_axes(Inertial(_origin(inertial), mass, (xx, xy, xz, yy, yz, zz)))
+    moments = principal.inertia[0], principal.inertia[3], principal.inertia[5]
+    if is_impossible(moments, _MOMENT_TOLERANCE):
         log(
-            f"{where}: no rigid body has the moments of inertia {list(moments)}: the largest is above the sum of the "
-            "others. MuJoCo refuses them; their mean stands for all three"
+            f"{where}: no rigid body has the moments of inertia {list(moments)}, because the largest exceeds the sum "
+            "of the others; MuJoCo rejects them, and their mean is used for all three"
         )
         moments = (sum(moments) / 3.0,) * 3
-    return MassProperties(mass, moments, turned.pose)
+    return MassProperties(mass, moments, principal.pose)
 
 
 def _shape(collision: Element, model: str, link: str) -> Shape:
@@ -233,7 +233,7 @@ def _origin(element: Element) -> Pose:
 
 
 def _rotation_to(normal: Iterable[float]) -> Quaternion:
-    """Returns the rotation that takes the z axis to a direction."""
+    """Returns the rotation from the z axis to a direction, as a quaternion xyzw."""
     result = np.zeros(4)
     mujoco.mju_quatZ2Vec(result, np.array(list(normal), dtype=float))
     w, x, y, z = result.tolist()
@@ -241,43 +241,52 @@ def _rotation_to(normal: Iterable[float]) -> Quaternion:
 
 
 def wxyz(quaternion: Quaternion) -> tuple[float, float, float, float]:
-    """Returns a quaternion as MuJoCo has it."""
+    """Converts a quaternion to MuJoCo's order."""
     x, y, z, w = quaternion
     return (w, x, y, z)
 
 
 class SpecWriter:
-    """Writes bodies into a model of MuJoCo.
+    """Writes bodies into a MuJoCo model.
 
     Args:
-        spec: The model.
+        spec: Specification of the model.
     """
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self._spec = spec
         self._meshes: dict[tuple[str, Vector3], str] = {}
 
-    def add(self, number: int, tree: BodyTree, centre_in_world: Pose, touching: frozenset[frozenset[int]]) -> None:
+    def add(self, number: int, tree: BodyTree, centre_in_world: Pose, colliding: frozenset[frozenset[int]]) -> None:
         """Adds a body.
 
         Args:
-            number: Of the body; part of the names.
-            tree: What it is made of.
-            centre_in_world: Of the root link.
-            touching: Pairs of its links that touch each other, by number; the others do not.
+            number: Id of the body, which is part of MuJoCo's names.
+            tree: Links of the body.
+            centre_in_world: Pose of the root link's centre in the world frame.
+            colliding: Pairs of link indices that collide with each other; other pairs of the body do not collide.
         """
         bodies: list[mujoco.MjsBody] = []
-        for rank, link in enumerate(tree.links):
-            above = self._spec.worldbody if link.parent is None else bodies[link.parent + 1]
-            bodies.append(self._add_link(above, link, body_name(number, rank - 1), number, tree, centre_in_world))
-        with_shapes = [rank - 1 for rank, link in enumerate(tree.links) if link.shapes]
-        for place, a in enumerate(with_shapes):
-            for b in with_shapes[place + 1 :]:
-                if frozenset((a, b)) not in touching:
+        for position, link in enumerate(tree.links):
+            parent_body = self._spec.worldbody if link.parent is None else bodies[link.parent + 1]
+            bodies.append(
+                self._add_link(parent_body, link, body_name(number, position - 1), number, tree, centre_in_world)
+            )
+        link_indices = [position - 1 for position, link in enumerate(tree.links) if link.shapes]
+        for first, a in enumerate(link_indices):
+            for b in link_indices[first + 1 :]:
+                if frozenset((a, b)) not in colliding:
                     self._spec.add_exclude(bodyname1=body_name(number, a), bodyname2=body_name(number, b))
 
     def weld(self, number: int, index: int, other: int, other_in_link: Pose) -> None:
-        """Fastens the root link of a body to a link of another one; the pose is that of its centre in the link."""
+        """Welds the root link of a body to a link of another body.
+
+        Args:
+            number: Id of the body with the link.
+            index: Index of the link.
+            other: Id of the welded body.
+            other_in_link: Pose of the welded body's centre in the frame of the link.
+        """
         anchor, torque_scale = (0.0, 0.0, 0.0), 1.0
         self._spec.add_equality(
             type=mujoco.mjtEq.mjEQ_WELD,
@@ -289,7 +298,7 @@ class SpecWriter:
 
     def _add_link(
         self,
-        above: mujoco.MjsBody,
+        parent_body: mujoco.MjsBody,
         link: Link,
         name: str,
         number: int,
@@ -302,7 +311,7 @@ class SpecWriter:
             pose, shift, centre = centre_in_world, centre.inverse(), Pose()
         elif link.parent < 0:
             pose = tree.links[0].mass.centre_in_link.inverse() @ pose
-        body = above.add_body(name=name, pos=pose.position, quat=wxyz(pose.quaternion))
+        body = parent_body.add_body(name=name, pos=pose.position, quat=wxyz(pose.quaternion))
         if link.mass.mass > 0.0:
             body.explicitinertial = True
             body.mass, body.inertia = link.mass.mass, link.mass.moments
@@ -317,29 +326,29 @@ class SpecWriter:
 
     def _add_joint(self, body: mujoco.MjsBody, joint: EngineJoint, axis: Vector3, name: str) -> None:
         limited = joint.kind is not JointKind.BALL and (math.isfinite(joint.lower) or math.isfinite(joint.upper))
-        far = 1e6
+        unlimited = 1e6
         body.add_joint(
             name=name,
             type=_TYPES[joint.kind],
             axis=axis,
             limited=int(limited),
-            range=(max(joint.lower, -far), min(joint.upper, far)) if limited else (0.0, 0.0),
-            solimp_limit=HARDEST,
-            solimp_friction=HARDEST,
+            range=(max(joint.lower, -unlimited), min(joint.upper, unlimited)) if limited else (0.0, 0.0),
+            solimp_limit=HARDEST_IMPEDANCE,
+            solimp_friction=HARDEST_IMPEDANCE,
         )
 
     def _add_shape(self, body: mujoco.MjsBody, shape: Shape, shift: Pose) -> None:
         pose = shift @ shape.pose
-        further = {"meshname": self._mesh(shape)} if shape.mesh else {"size": shape.size}
+        options = {"meshname": self._mesh(shape)} if shape.mesh else {"size": shape.size}
         body.add_geom(
             type=shape.kind,
             pos=pose.position,
             quat=wxyz(pose.quaternion),
             condim=6,
-            margin=REACH_M,
-            solimp=HARDEST,
+            margin=CONTACT_MARGIN_M,
+            solimp=HARDEST_IMPEDANCE,
             mass=0.0,
-            **further,
+            **options,
         )
 
     def _mesh(self, shape: Shape) -> str:
@@ -358,5 +367,5 @@ def body_name(number: int, index: int) -> str:
 
 
 def joint_name(number: int, index: int) -> str:
-    """Returns MuJoCo's name of the joint above a link; -1 is that of a body that moves freely."""
+    """Returns MuJoCo's name of the joint of a link; the index -1 stands for the free joint of the body."""
     return f"{number}:{index}"

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A step of MuJoCo with the contacts and motors that PyBullet and Gazebo mean.
+"""A step of MuJoCo with the contacts and motors of PyBullet and Gazebo.
 
-MuJoCo solves for accelerations that come as near as forces within their bounds allow to reference accelerations: of a
-contact and of a joint with dry friction, that of coming to rest. Between its own functions, `step` puts in place:
+MuJoCo solves for accelerations as close to reference accelerations as the bounds of the forces allow. For a contact or
+a joint with dry friction, the reference is to come to rest. Between MuJoCo's own functions, `step` changes the
+following:
 
-- of two surfaces the smaller coefficients count (MuJoCo takes the larger ones);
-- every reference is reached within one step, but for the share of penetrations that `PhysicsSettings` says;
-- surfaces that bounce have the reference of leaving with the share of their velocity (MuJoCo has no restitution);
-- a motor is dry friction against a joint that should move with the motor's velocity, so that its bound is exact, and
-  it is solved together with the contacts of what it moves.
+- A contact uses the smaller coefficients of its two surfaces (MuJoCo uses the larger coefficients).
+- Every reference is reached within one step, except the fraction of penetrations given by `PhysicsSettings`.
+- Bouncing surfaces have a reference velocity in proportion to the impact velocity (MuJoCo has no restitution).
+- A motor is dry friction relative to the motor's velocity, so that its maximum effort is exact and the solver treats
+  the motor and the contacts of the moved links together.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ from modular_framework_urdf.rotations import Vector3
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-SLIDING, SPINNING, ROLLING, BOUNCING, YIELDING, CORRECTION = range(6)
-"""Columns of the coefficients of shapes: of friction and restitution; then, of a surface that gives way, one over its
-stiffness [m/N], and the share of a penetration that is corrected in one step; 0 and 0 of one that is rigid."""
+SLIDING, SPINNING, ROLLING, RESTITUTION, COMPLIANCE, CORRECTION = range(6)
+"""Columns of the coefficients of shapes: friction and restitution; for a compliant surface also the compliance [m/N]
+and the fraction of a penetration that is corrected in one step, which are 0 for a rigid surface."""
 
 _LIMIT, _MOTOR = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
 _WELD = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-"""Joints with one degree of freedom."""
+"""Types of joints with one degree of freedom."""
 
 _DISABLED = (
     mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
@@ -43,37 +44,38 @@ _DISABLED = (
 )
 
 _NOSLIP_ITERATIONS = 3
-"""Passes over the friction forces without the softness of the solver: with them, what is held does not creep."""
+"""Solver passes over the friction forces without softness, which prevent held objects from creeping."""
 
-_FREE = 1e3
-"""Loss of velocity in a step [m/s] that no contact has to prevent."""
+_FREE_VELOCITY_LOSS = 1e3
+"""Velocity loss in a step [m/s] that no contact needs to prevent."""
 
-_LEAST_FRICTION = 1e-5
-"""The least that MuJoCo divides by; where a coefficient is smaller, the contact has no such friction."""
+_MIN_FRICTION = 1e-5
+"""Minimum coefficient for MuJoCo's divisions; contacts with a smaller coefficient have no friction of this kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class SavedDynamics:
-    """A copy of all that moves: MuJoCo's state, and what there is of each degree of freedom."""
+    """Copy of MuJoCo's state and of all values per degree of freedom."""
 
     physics: Array
     by_dof: tuple[Array, ...]
 
 
 class MujocoDynamics:
-    """A model of MuJoCo in motion.
+    """State of a MuJoCo model in motion.
 
     Args:
-        model: The model.
-        settings: Numbers of the physics.
-        gravity: [m/s^2]
+        model: Compiled model.
+        settings: Settings of the physics.
+        gravity: Gravity vector in the world frame [m/s^2].
 
     Attributes:
-        coefficients: Of shapes, see the columns above.
-        motor_velocities: Of motors by degree of freedom [rad/s or m/s], to which comes what corrects the position.
-        motor_targets: Positions that motors want [rad or m].
-        motor_gains: Share of a position error that a motor corrects in one step; 0: it wants no position.
-        motor_efforts: What the motors did in the last step [Nm or N].
+        coefficients: Coefficients of shapes, shape (n, 6), with the columns above.
+        motor_velocities: Motor velocities without position correction, by degree of freedom [rad/s or m/s].
+        motor_targets: Target positions of motors, by degree of freedom [rad or m].
+        motor_gains: Fraction of a position error that a motor corrects in one step, by degree of freedom; 0 for a
+            motor without target position.
+        motor_efforts: Efforts of the motors in the last step, by degree of freedom [Nm or N].
         measures_loads: Whether the loads on joints are computed, see `load`.
     """
 
@@ -82,52 +84,52 @@ class MujocoDynamics:
         self.settings = settings
         self.adjust(settings, gravity)
         self.coefficients = np.zeros((model.ngeom, 6))
-        self._pairs = np.zeros((0, 2, 6))  # of both shapes of every contact
+        self._pairs = np.zeros((0, 2, 6))  # coefficients of both shapes, by contact
         self.motor_velocities, self.motor_targets, self.motor_gains, self.motor_efforts = np.zeros((4, model.nv))
         self.measures_loads = False
         self._forces, self._torques = np.zeros((2, model.nbody, 3))
         single = np.isin(model.jnt_type, _SINGLE)
         self._single_dofs, self._single_positions = model.jnt_dofadr[single], model.jnt_qposadr[single]
-        self._moved = True
-        self._touches: tuple[Indices, Array, Array] | None = None
+        self._outdated = True
+        self._contacts: tuple[Indices, Array, Array] | None = None
 
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
-        """Continues with other settings and gravity [m/s^2]."""
+        """Changes settings and gravity [m/s^2]."""
         self.settings, options = settings, self.model.opt
         options.timestep, options.gravity[:] = settings.time_step_s, gravity
         options.iterations, options.noslip_iterations = settings.solver_iterations, _NOSLIP_ITERATIONS
         options.cone, options.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
         options.integrator = mujoco.mjtIntegrator.mjINT_EULER
-        # Damping of joints is explicit, as `joint_resistance` computes it; islands would copy references too early.
+        # Joint damping is explicit, as computed by `joint_resistance`; islands would copy references too early.
         options.disableflags = sum(int(each) for each in _DISABLED)
 
-    def moved(self) -> None:
-        """Says that something was put elsewhere."""
-        self._moved = True
+    def mark_moved(self) -> None:
+        """Records that a position was changed from outside."""
+        self._outdated = True
 
-    def locate(self) -> None:
-        """Computes where all bodies are and how they move, if something has moved since the last time."""
-        if self._moved:
+    def update_kinematics(self) -> None:
+        """Computes poses and velocities of all bodies, if a body has moved since the last call."""
+        if self._outdated:
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             mujoco.mj_comVel(self.model, self.data)
-            self._moved = False
+            self._outdated = False
 
     def step(self) -> None:
-        """Advances the physics by one time step; forces that were applied end with it.
+        """Advances the physics by one time step; applied forces end with the step.
 
         Raises:
-            SimulationError: It came to velocities that are no numbers.
+            SimulationError: The velocities are no longer finite.
         """
         model, data = self.model, self.data
-        self.locate()
+        self.update_kinematics()
         mujoco.mj_makeM(model, data)
         mujoco.mj_factorM(model, data)
         mujoco.mj_collision(model, data)
         self._pairs = self.coefficients[data.contact.geom] if data.ncon else np.zeros((0, 2, 6))
         self._set_frictions()
         mujoco.mj_makeConstraint(model, data)
-        self._soften()
+        self._set_softness()
         mujoco.mj_island(model, data)
         mujoco.mj_projectConstraint(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -137,29 +139,29 @@ class MujocoDynamics:
         mujoco.mj_fwdConstraint(model, data)
         self.motor_efforts[:] = 0.0
         self.motor_efforts[data.efc_id[motors]] = data.efc_force[motors]
-        self._touches = None
+        self._contacts = None
         if self.measures_loads:
             self._measure_loads()
         mujoco.mj_Euler(model, data)
         data.xfrc_applied[:], data.qfrc_applied[:] = 0.0, 0.0
-        self._moved = True
+        self._outdated = True
         if not math.isfinite(float(data.qvel.sum())):
-            raise SimulationError("the physics engine mujoco came to velocities that are no numbers")
+            raise SimulationError("the velocities of the physics engine mujoco are no longer finite")
 
-    def touches(self) -> tuple[Indices, Array, Array]:
-        """Returns the contacts of the last step: their two bodies, normal force [N] and distance [m]."""
-        if self._touches is None:
+    def contacts(self) -> tuple[Indices, Array, Array]:
+        """Returns the contacts of the last step: body ids, normal forces [N] and distances [m]."""
+        if self._contacts is None:
             contact, data = self.data.contact, self.data
             if data.ncon == 0:
-                self._touches = np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0)
+                self._contacts = np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0)
             else:
                 rows = np.array(contact.efc_address)
                 forces = np.where(rows >= 0, data.efc_force[np.maximum(rows, 0)], 0.0) if data.nefc else 0.0 * rows
-                self._touches = self.model.geom_bodyid[contact.geom], forces, np.array(contact.dist)
-        return self._touches
+                self._contacts = self.model.geom_bodyid[contact.geom], forces, np.array(contact.dist)
+        return self._contacts
 
     def contact(self, row: int) -> tuple[Vector3, Array, Array]:
-        """Returns a contact of the last step: position [m], and normal and force [N] on the second of its bodies."""
+        """Returns a contact of the last step: position [m], and normal and force [N] on its second body."""
         contact = self.data.contact[row]
         force = np.zeros(6)
         mujoco.mj_contactForce(self.model, self.data, row, force)
@@ -168,111 +170,113 @@ class MujocoDynamics:
         return (x, y, z), axes[0], force[:3] @ axes
 
     def _set_frictions(self) -> None:
-        """Gives contacts the smaller coefficients; what resists spin and roll adds up, each times the other's friction.
+        """Sets the friction of contacts: the smaller sliding coefficients, and combined spinning and rolling terms.
 
-        The latter is the rule of Bullet.
+        As in Bullet, the resistances of both surfaces add up, each multiplied by the other's sliding coefficient.
         """
         contact, a, b = self.data.contact, self._pairs[:, 0], self._pairs[:, 1]
         if self.data.ncon == 0:
             return
         slide = np.minimum(a[:, SLIDING], b[:, SLIDING])
         spin, roll = (a[:, each] * b[:, SLIDING] + b[:, each] * a[:, SLIDING] for each in (SPINNING, ROLLING))
-        kinds = np.where(roll > _LEAST_FRICTION, 6, np.where(spin > _LEAST_FRICTION, 4, 3))
-        contact.dim[:] = np.where(slide > _LEAST_FRICTION, kinds, 1)
-        contact.friction[:] = np.maximum(np.stack((slide, slide, spin, roll, roll), axis=1), _LEAST_FRICTION)
+        kinds = np.where(roll > _MIN_FRICTION, 6, np.where(spin > _MIN_FRICTION, 4, 3))
+        contact.dim[:] = np.where(slide > _MIN_FRICTION, kinds, 1)
+        contact.friction[:] = np.maximum(np.stack((slide, slide, spin, roll, roll), axis=1), _MIN_FRICTION)
 
     def _set_references(self) -> Indices:
-        """Sets the acceleration that every constraint wants; returns the rows of the motors."""
+        """Sets the reference acceleration of every constraint; returns the rows of the motors."""
         data, settings = self.data, self.settings
         if data.nefc == 0:
             return np.zeros(0, dtype=np.int64)
         step_s, kinds = settings.time_step_s, np.asarray(data.efc_type)
-        shares = np.full(data.nefc, settings.contact_erp)
-        shares[kinds == _LIMIT] = settings.hardest_erp
+        fractions = np.full(data.nefc, settings.contact_erp)
+        fractions[kinds == _LIMIT] = settings.hardest_erp
         if data.ncon:
-            self._set_shares(shares)
-        # What is apart may come as near as to touch; of what is inside each other, a share comes out.
-        wanted = -np.where(data.efc_pos < 0.0, shares, 1.0) / step_s * data.efc_pos
+            self._set_correction_fractions(fractions)
+        # A gap may close exactly within the step; a penetration is corrected by a fraction.
+        references = -np.where(data.efc_pos < 0.0, fractions, 1.0) / step_s * data.efc_pos
         welds = kinds == _WELD
-        wanted[welds] = -settings.hardest_erp / step_s * data.efc_pos[welds]
+        references[welds] = -settings.hardest_erp / step_s * data.efc_pos[welds]
         motors = np.flatnonzero(kinds == _MOTOR)
         positions = np.zeros(self.model.nv)
         positions[self._single_dofs] = data.qpos[self._single_positions]
         correction = self.motor_gains / step_s * (self.motor_targets - positions)
-        wanted[motors] = (self.motor_velocities + correction)[data.efc_id[motors]]
+        references[motors] = (self.motor_velocities + correction)[data.efc_id[motors]]
         if data.ncon:
-            self._let_bounce(wanted)
-        data.efc_aref[:] = (wanted - data.efc_vel) / step_s
+            self._set_bounce_references(references)
+        data.efc_aref[:] = (references - data.efc_vel) / step_s
         return motors
 
-    def _soften(self) -> None:
-        """Lets contacts give way as their stiffness says: the springs of the two surfaces act one behind the other."""
+    def _set_softness(self) -> None:
+        """Sets the softness of contacts, with the springs of the two surfaces in series."""
         data, contact = self.data, self.data.contact
-        if not self._pairs[:, :, YIELDING].any():
+        if not self._pairs[:, :, COMPLIANCE].any():
             return
-        yielding, share = self._pairs[:, :, YIELDING].sum(axis=1), self._pairs[:, :, CORRECTION].max(axis=1)
-        for each in np.flatnonzero((yielding > 0.0) & (contact.efc_address >= 0)):
+        compliance, fraction = self._pairs[:, :, COMPLIANCE].sum(axis=1), self._pairs[:, :, CORRECTION].max(axis=1)
+        for each in np.flatnonzero((compliance > 0.0) & (contact.efc_address >= 0)):
             begin = contact.efc_address[each]
             rows = slice(begin, begin + contact.dim[each])
-            softness = share[each] / self.settings.time_step_s**2 * yielding[each]
+            softness = fraction[each] / self.settings.time_step_s**2 * compliance[each]
             data.efc_R[rows] *= max(1.0, softness / data.efc_R[begin])
             data.efc_D[rows] = 1.0 / data.efc_R[rows]
 
-    def _set_shares(self, shares: Array) -> None:
-        """Sets the share of its penetration that a contact which bounces or gives way corrects in one step."""
-        present = self.data.contact.efc_address >= 0
-        rows = self.data.contact.efc_address[present]
-        own = self._pairs[present, :, CORRECTION].max(axis=1)
-        own[own == 0.0] = self.settings.contact_erp
-        shares[rows] = np.where(self._pairs[present, :, BOUNCING].min(axis=1) > 0.0, self.settings.bounce_erp, own)
+    def _set_correction_fractions(self, fractions: Array) -> None:
+        """Sets the fraction of penetration that bouncing and compliant contacts correct in one step."""
+        active = self.data.contact.efc_address >= 0
+        rows = self.data.contact.efc_address[active]
+        correction = self._pairs[active, :, CORRECTION].max(axis=1)
+        correction[correction == 0.0] = self.settings.contact_erp
+        fractions[rows] = np.where(
+            self._pairs[active, :, RESTITUTION].min(axis=1) > 0.0, self.settings.bounce_erp, correction
+        )
 
-    def _let_bounce(self, wanted: Array) -> None:
-        """Lets bouncing contacts leave with the share of the velocity with which they met."""
+    def _set_bounce_references(self, references: Array) -> None:
+        """Sets the separation velocity of bouncing contacts in proportion to their impact velocity."""
         data = self.data
-        shares = self._pairs[:, :, BOUNCING].min(axis=1)
-        if not shares.any():
+        fractions = self._pairs[:, :, RESTITUTION].min(axis=1)
+        if not fractions.any():
             return
-        bouncing = np.flatnonzero((shares > 0.0) & (data.contact.efc_address >= 0))
+        bouncing = np.flatnonzero((fractions > 0.0) & (data.contact.efc_address >= 0))
         rows = data.contact.efc_address[bouncing]
         apart = rows[data.efc_pos[rows] > 0.0]
-        wanted[apart] = data.efc_vel[apart] - _FREE  # the impact is to have the whole velocity
+        references[apart] = data.efc_vel[apart] - _FREE_VELOCITY_LOSS  # no braking before the impact
         fast = data.efc_vel[rows] < -self.settings.bounce_threshold
         fast &= data.efc_pos[rows] <= 0.0
-        wanted[rows[fast]] = -shares[bouncing[fast]] * data.efc_vel[rows[fast]]
+        references[rows[fast]] = -fractions[bouncing[fast]] * data.efc_vel[rows[fast]]
 
     def _measure_loads(self) -> None:
         model, data = self.model, self.data
         mujoco.mj_rnePostConstraint(model, data)
-        torques, forces = data.cfrc_int[:, :3], data.cfrc_int[:, 3:]  # on each body, about the centre of its tree
+        torques, forces = data.cfrc_int[:, :3], data.cfrc_int[:, 3:]  # on each body, about its tree's centre of mass
         levers = data.subtree_com[model.body_rootid] - data.xpos
         axes = data.xmat.reshape(-1, 3, 3)
         self._forces = np.einsum("bji,bj->bi", axes, forces)
         self._torques = np.einsum("bji,bj->bi", axes, torques + np.cross(levers, forces))
 
     def load(self, body: int) -> tuple[Vector3, Vector3]:
-        """Returns force [N] and torque [Nm] of a body on the one above in the last step, about and in its own frame."""
+        """Returns the force [N] and torque [Nm] of a body on its parent in the last step, in the body frame."""
         fx, fy, fz = (-self._forces[body]).tolist()
         tx, ty, tz = (-self._torques[body]).tolist()
         return (fx, fy, fz), (tx, ty, tz)
 
     def by_dof(self) -> tuple[Array, ...]:
-        """Returns what there is of each degree of freedom besides positions: motion, efforts, resistance, motors."""
+        """Returns all values per degree of freedom except positions: motion, efforts, resistance and motors."""
         data, model = self.data, self.model
         motors = (self.motor_velocities, self.motor_targets, self.motor_gains, self.motor_efforts)
         return (data.qvel, data.qacc_warmstart, data.qfrc_applied, model.dof_frictionloss, model.dof_damping, *motors)
 
     def state(self) -> SavedDynamics:
-        """Returns a copy of all that moves."""
+        """Returns a copy of the state."""
         size = mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION)
         physics = np.zeros(size)
         mujoco.mj_getState(self.model, self.data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
         return SavedDynamics(physics, tuple(values.copy() for values in self.by_dof()))
 
     def set_state(self, state: SavedDynamics) -> None:
-        """Continues from a saved state of this model."""
+        """Restores a saved state of this model."""
         mujoco.mj_setState(self.model, self.data, state.physics, mujoco.mjtState.mjSTATE_INTEGRATION)
         for target, source in zip(self.by_dof(), state.by_dof, strict=True):
             target[:] = source
         self.data.ncon = 0
-        self._touches = None
-        self._moved = True
+        self._contacts = None
+        self._outdated = True

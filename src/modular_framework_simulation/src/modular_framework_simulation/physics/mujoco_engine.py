@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""MuJoCo, the second engine: its model is made again whenever a body comes or goes, and what moves goes on moving."""
+"""MuJoCo as the physics engine; its model is recompiled for each added or removed body, and all motion continues."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from modular_framework_simulation.physics.mujoco_bodies import (
 from modular_framework_simulation.physics.mujoco_dynamics import MujocoDynamics, SavedDynamics
 from modular_framework_simulation.physics.physics_engine import (
     BASE_INDEX,
-    SHOWN_CHARACTERS,
+    MAX_SHOWN_CHARACTERS,
     EngineContact,
     EngineJoint,
     JointKind,
@@ -41,12 +41,12 @@ from modular_framework_simulation.physics.surfaces import softness_of
 from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
 
 _WIDTHS = {JointKind.FIXED: (0, 0), JointKind.BALL: (4, 3)}
-"""How many positions and velocities a joint has; others have one of each."""
+"""Numbers of positions and velocities per joint type; 1 for other types."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Span:
-    """Where the positions and velocities of a joint are in the state: begin and end."""
+    """Slices of a joint's positions and velocities in the state vectors."""
 
     positions: slice
     dofs: slice
@@ -54,20 +54,20 @@ class _Span:
 
 @dataclass(slots=True)
 class _Body:
-    """A body in the model.
+    """Body in the model.
 
     Attributes:
-        tree: What it is made of.
-        pose: Of the root's centre in the world, where it is fastened there.
-        touching: Pairs of its links that touch each other.
-        surfaces: By link.
-        ids: MuJoCo's numbers of the root and of the links.
-        spans: Of the root's free joint and of the joints.
+        tree: Links of the body.
+        pose: Pose of the root's centre of mass in the world frame, for a fixed body.
+        colliding: Pairs of the body's links that collide with each other.
+        surfaces: Surfaces by link index.
+        ids: MuJoCo's body ids of the root and of the links.
+        spans: State slices of the root's free joint and of the joints.
     """
 
     tree: BodyTree
     pose: Pose = field(default_factory=Pose)
-    touching: frozenset[frozenset[int]] = frozenset()
+    colliding: frozenset[frozenset[int]] = frozenset()
     surfaces: dict[int, Surface] = field(default_factory=dict)
     ids: list[int] = field(default_factory=list)
     spans: list[_Span] = field(default_factory=list)
@@ -75,7 +75,7 @@ class _Body:
 
 @dataclass(frozen=True, slots=True)
 class _Weld:
-    """A link, by numbers of its body and its own, and the body that is fastened to it."""
+    """Weld between a link, given by body id and link index, and another body."""
 
     number: int
     index: int
@@ -85,11 +85,11 @@ class _Weld:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """A saved state.
+    """Saved state.
 
     Attributes:
-        poses: Of the fixed bodies, by number of all bodies.
-        dynamics: All that moves.
+        poses: Poses of the fixed bodies, by body id.
+        dynamics: State of all moving bodies.
     """
 
     poses: dict[int, Pose]
@@ -97,13 +97,13 @@ class _State:
 
 
 class MujocoEngine(PhysicsEngine):
-    """MuJoCo with nothing in it.
+    """Empty MuJoCo engine.
 
     Args:
-        settings: Its numbers.
-        gravity: [m/s^2]
-        gui: Whether a window was asked for: there is none, and a log line says so.
-        log: Takes lines of text about what is not as a description says.
+        settings: Settings of the physics engine.
+        gravity: Gravity vector in the world frame [m/s^2].
+        gui: Whether a window was requested; MuJoCo has no window, which is logged.
+        log: Function that logs deviations from a description.
     """
 
     name = "mujoco"
@@ -112,21 +112,21 @@ class MujocoEngine(PhysicsEngine):
 
     def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
         if gui:
-            log("a window of the simulation was asked for; the physics engine mujoco has none here: running headless")
+            log("the physics engine mujoco has no window: running headless")
         self.settings, self._gravity, self._log = settings, gravity, log
         self._bodies: dict[int, _Body] = {}
         self._last_number = self._last_weld = -1
         self._welds: dict[int, _Weld] = {}
         self._dynamics = MujocoDynamics(mujoco.MjSpec().compile(), settings, gravity)
-        self._number_of = np.full(1, -1)
+        self._body_id_of = np.full(1, -1)
 
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
-        """Continues with other settings and gravity."""
+        """Changes settings and gravity [m/s^2]."""
         self.settings, self._gravity = settings, gravity
         self._dynamics.adjust(settings, gravity)
 
     def restart(self, gravity: Vector3) -> None:
-        """Takes everything out."""
+        """Removes all bodies."""
         self._gravity = gravity
         self._bodies, self._welds = {}, {}
         self._compile(self._bodies)
@@ -136,58 +136,58 @@ class MujocoEngine(PhysicsEngine):
         self._dynamics.step()
 
     def resting(self) -> Collection[int]:
-        """Returns no body: each is computed in every step."""
+        """Returns no bodies, because MuJoCo computes all bodies in every step."""
         return ()
 
     def close(self) -> None:
-        """Does nothing: MuJoCo's memory is freed with this object."""
+        """Does nothing, because Python frees MuJoCo's memory with this object."""
 
     # Bodies
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
-        """Loads a body."""
-        refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
+        """Loads a body; see `PhysicsEngine`."""
+        refuse_long_names(text, f"model '{name[:MAX_SHOWN_CHARACTERS]}'")
         tree = read_tree(text, name, fixed, self._log)
         number = self._last_number + 1
-        every = range(BASE_INDEX, len(tree.links) - 1)
-        touching = frozenset(frozenset((a, b)) for a in every for b in every if a < b and self_collision)
+        indices = range(BASE_INDEX, len(tree.links) - 1)
+        colliding = frozenset(frozenset((a, b)) for a in indices for b in indices if a < b and self_collision)
         try:
-            self._compile(self._bodies | {number: _Body(tree, tree.links[0].mass.centre_in_link, touching)})
+            self._compile(self._bodies | {number: _Body(tree, tree.links[0].mass.centre_in_link, colliding)})
         except ValueError as error:
-            problem = f"is refused by the physics engine mujoco ({' '.join(str(error).split())})"
+            problem = f"is rejected by the physics engine mujoco ({' '.join(str(error).split())})"
             raise DescriptionError(f"model '{name}'", problem, "check its shapes, masses and joints") from error
         self._last_number = number
         return number
 
     def _compile(self, bodies: dict[int, _Body]) -> None:
-        """Makes MuJoCo's model of bodies; those that were there go on moving as they do.
+        """Compiles MuJoCo's model of bodies; the motion of existing bodies continues.
 
         Raises:
-            ValueError: MuJoCo refuses a body; nothing has changed then.
+            ValueError: MuJoCo rejects a body; nothing has changed.
         """
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
         writer = SpecWriter(spec)
         for number, body in bodies.items():
-            writer.add(number, body.tree, body.pose, body.touching)
+            writer.add(number, body.tree, body.pose, body.colliding)
         for weld in self._welds.values():
             writer.weld(weld.number, weld.index, weld.other, weld.other_in_link)
-        before, now = self._dynamics, MujocoDynamics(spec.compile(), self.settings, self._gravity)
-        now.measures_loads = before.measures_loads and bool(bodies)
-        self._number_of = np.full(now.model.nbody, -1)
+        old, new = self._dynamics, MujocoDynamics(spec.compile(), self.settings, self._gravity)
+        new.measures_loads = old.measures_loads and bool(bodies)
+        self._body_id_of = np.full(new.model.nbody, -1)
         for number, body in bodies.items():
-            ids, spans = _found(now.model, number, body.tree)
+            ids, spans = _ids_and_spans(new.model, number, body.tree)
             if body.ids:
-                _copy_motion(before, body, now, ids, spans)
+                _copy_motion(old, body, new, ids, spans)
             body.ids, body.spans = ids, spans
-            self._number_of[ids] = number
-        self._dynamics, self._bodies = now, bodies
+            self._body_id_of[ids] = number
+        self._dynamics, self._bodies = new, bodies
         for body in bodies.values():
             for index, surface in body.surfaces.items():
                 self._write_surface(body, index, surface)
 
     def remove_body(self, number: int) -> None:
-        """Takes a body out."""
+        """Removes a body."""
         self._compile({each: body for each, body in self._bodies.items() if each != number})
 
     def root_link(self, number: int) -> str:
@@ -195,56 +195,56 @@ class MujocoEngine(PhysicsEngine):
         return self._bodies[number].tree.links[0].name
 
     def joints(self, number: int) -> list[EngineJoint]:
-        """Returns every joint of a body."""
+        """Returns all joints of a body."""
         return [link.joint for link in self._bodies[number].tree.links if link.joint is not None]
 
     def mass_properties(self, number: int, index: int) -> MassProperties:
-        """Returns the mass of a link and its distribution."""
+        """Returns the mass properties of a link."""
         return self._bodies[number].tree.links[index + 1].mass
 
     def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
-        """Returns the joint space inertia."""
+        """Returns the joint space inertia matrix; see `PhysicsEngine`."""
         model, data, body = self._dynamics.model, self._dynamics.data, self._bodies[number]
-        self._dynamics.locate()
+        self._dynamics.update_kinematics()
         mujoco.mj_makeM(model, data)
-        whole = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, whole)
+        matrix = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, matrix)
         spans = [body.spans[0], *(body.spans[index + 1] for index in indices)]
         dofs = [dof for span in spans for dof in range(span.dofs.start, span.dofs.stop)]
-        return whole[np.ix_(dofs, dofs)]
+        return matrix[np.ix_(dofs, dofs)]
 
     def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
-        """Sets which pairs of links touch."""
-        self._bodies[number].touching = frozenset(allowed)
+        """Sets the pairs of links that collide."""
+        self._bodies[number].colliding = frozenset(allowed)
         self._compile(self._bodies)
 
     def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
-        """Sets friction, bounce and softness of a link; friction needs no anchors here."""
+        """Sets friction, bounce and softness of a link; MuJoCo's friction does not need anchors."""
         del anchored
         body = self._bodies[number]
         body.surfaces[index] = surface
         self._write_surface(body, index, surface)
 
     def remove_margin(self, number: int, index: int) -> None:
-        """Does nothing: MuJoCo's shapes touch where they are."""
+        """Does nothing, because MuJoCo's shapes have no margin."""
 
     def remove_velocity_damping(self, number: int) -> None:
-        """Does nothing: MuJoCo brakes no body."""
+        """Does nothing, because MuJoCo does not damp velocities."""
 
     def _write_surface(self, body: _Body, index: int, surface: Surface) -> None:
         shapes = self._dynamics.model.geom_bodyid == body.ids[index + 1]
-        yielding = correction = 0.0
+        compliance = correction = 0.0
         if (softness := softness_of(surface, self.settings)) is not None:
             kp, kd = softness
-            push = kp * self.settings.time_step_s
-            yielding, correction = 1.0 / kp, push / (push + kd)
-        row = (surface.lateral, surface.spinning, surface.rolling, surface.restitution, yielding, correction)
+            stiffness_step = kp * self.settings.time_step_s
+            compliance, correction = 1.0 / kp, stiffness_step / (stiffness_step + kd)
+        row = (surface.lateral, surface.spinning, surface.rolling, surface.restitution, compliance, correction)
         self._dynamics.coefficients[shapes] = row
 
     # Motion
 
     def base_centre(self, number: int) -> Pose:
-        """Returns the pose of the root link's centre."""
+        """Returns the pose of the root link's centre of mass."""
         body = self._bodies[number]
         if body.tree.fixed:
             return body.pose
@@ -252,7 +252,7 @@ class MujocoEngine(PhysicsEngine):
         return Pose((values[0], values[1], values[2]), (values[4], values[5], values[6], values[3]))
 
     def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
-        """Returns the velocity of the root link's centre."""
+        """Returns linear and angular velocity of the root link's centre of mass."""
         body = self._bodies[number]
         if body.tree.fixed:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -260,7 +260,7 @@ class MujocoEngine(PhysicsEngine):
         return (vx, vy, vz), rotate_vector(self.base_centre(number).quaternion, (wx, wy, wz))
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
-        """Puts a body somewhere."""
+        """Sets the pose of the root link's centre of mass, with the root link at rest."""
         body, model, data = self._bodies[number], self._dynamics.model, self._dynamics.data
         if body.tree.fixed:
             body.pose = pose
@@ -268,19 +268,19 @@ class MujocoEngine(PhysicsEngine):
         else:
             data.qpos[body.spans[0].positions] = (*pose.position, *wxyz(pose.quaternion))
             data.qvel[body.spans[0].dofs] = 0.0
-        self._dynamics.moved()
+        self._dynamics.mark_moved()
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
-        """Sets the velocity of the root link's centre."""
+        """Sets the velocity of the root link's centre of mass."""
         body = self._bodies[number]
         if not body.tree.fixed:
-            own = rotate_vector(self.base_centre(number).inverse().quaternion, angular)
-            self._dynamics.data.qvel[body.spans[0].dofs] = (*linear, *own)
-            self._dynamics.moved()
+            angular_in_body = rotate_vector(self.base_centre(number).inverse().quaternion, angular)
+            self._dynamics.data.qvel[body.spans[0].dofs] = (*linear, *angular_in_body)
+            self._dynamics.mark_moved()
 
     def link_motion(self, number: int, index: int) -> LinkMotion:
-        """Returns where a link is and how it moves."""
-        self._dynamics.locate()
+        """Returns pose and velocity of a link."""
+        self._dynamics.update_kinematics()
         model, data, body = self._dynamics.model, self._dynamics.data, self._bodies[number].ids[index + 1]
         frame = _pose(data.xpos[body], data.xquat[body])
         centre = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
@@ -290,8 +290,8 @@ class MujocoEngine(PhysicsEngine):
         return LinkMotion(centre, frame, (vx, vy, vz), (wx, wy, wz))
 
     def weld(self, number: int, index: int, other: int) -> int:
-        """Fastens a body to a link."""
-        self._dynamics.locate()
+        """Welds a body to a link; see `PhysicsEngine`."""
+        self._dynamics.update_kinematics()
         data, link = self._dynamics.data, self._bodies[number].ids[index + 1]
         other_in_link = _pose(data.xpos[link], data.xquat[link]).inverse() @ self.base_centre(other)
         self._last_weld += 1
@@ -300,34 +300,34 @@ class MujocoEngine(PhysicsEngine):
         return self._last_weld
 
     def remove_weld(self, weld: int) -> None:
-        """Ends a weld."""
+        """Removes a weld."""
         del self._welds[weld]
         self._compile(self._bodies)
 
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
-        """Lets a force act at a point of a link."""
-        self._dynamics.locate()
+        """Applies a force [N] at a point of a link [m] in the next step."""
+        self._dynamics.update_kinematics()
         data, body = self._dynamics.data, self._bodies[number].ids[index + 1]
         data.xfrc_applied[body, :3] += force
         data.xfrc_applied[body, 3:] += np.cross(np.subtract(point, data.xipos[body]), force)
 
     def touches(self, number: int, index: int) -> list[Touch]:
-        """Returns where a link touched others."""
-        bodies, forces, distances = self._dynamics.touches()
+        """Returns the contacts of a link with other bodies."""
+        bodies, forces, distances = self._dynamics.contacts()
         found = []
         for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
-            other = int(self._number_of[bodies[row, 1 - side]])
+            other = int(self._body_id_of[bodies[row, 1 - side]])
             if other != number:
                 found.append(Touch(other, float(forces[row]), float(distances[row])))
         return found
 
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
-        """Returns where a link touched others."""
-        bodies, _, distances = self._dynamics.touches()
+        """Returns the contact points of a link, with forces."""
+        bodies, _, distances = self._dynamics.contacts()
         found = []
         for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
             body, distance = int(bodies[row, 1 - side]), float(distances[row])
-            other = int(self._number_of[body])
+            other = int(self._body_id_of[body])
             position, normal, force = self._dynamics.contact(row)
             if other < 0 or (distance > 0.0 and not any(force)):
                 continue
@@ -351,29 +351,29 @@ class MujocoEngine(PhysicsEngine):
         return [JointState(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
-        """Puts a joint somewhere."""
+        """Sets position and velocity of a joint."""
         span, data = self._span(number, index), self._dynamics.data
         data.qpos[span.positions], data.qvel[span.dofs] = position, velocity
-        self._dynamics.moved()
+        self._dynamics.mark_moved()
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
-        """Returns rotation and velocity of a ball joint, the latter in the axes of the link below."""
+        """Returns rotation and angular velocity of a ball joint, the latter in the frame of the child link."""
         span, data = self._span(number, index), self._dynamics.data
         w, x, y, z = data.qpos[span.positions].tolist()
         rx, ry, rz = data.qvel[span.dofs].tolist()
         return (x, y, z, w), (rx, ry, rz)
 
     def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
-        """Puts a ball joint somewhere."""
+        """Sets rotation and angular velocity of a ball joint."""
         span, data = self._span(number, index), self._dynamics.data
         data.qpos[span.positions], data.qvel[span.dofs] = wxyz(turn), rate
-        self._dynamics.moved()
+        self._dynamics.mark_moved()
 
     def release_ball_joint(self, number: int, index: int) -> None:
-        """Does nothing: a ball joint has no motor."""
+        """Does nothing, because MuJoCo's ball joints have no motor."""
 
     def set_joint_damping(self, number: int, index: int, damping: float) -> None:
-        """Sets the resistance of a joint per velocity."""
+        """Sets the viscous damping of a joint."""
         self._dynamics.model.dof_damping[self._span(number, index).dofs] = damping
 
     def set_position_motors(
@@ -385,69 +385,83 @@ class MujocoEngine(PhysicsEngine):
         efforts: Sequence[float],
         gain: float,
     ) -> None:
-        """Lets motors move joints to positions."""
+        """Sets motors that move joints to positions; see `PhysicsEngine`."""
         dofs = [self._span(number, index).dofs.start for index in indices]
         dynamics = self._dynamics
         dynamics.motor_targets[dofs], dynamics.motor_velocities[dofs] = targets, velocities
         dynamics.motor_gains[dofs], dynamics.model.dof_frictionloss[dofs] = gain, efforts
 
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
-        """Lets a motor bring a joint to a velocity."""
+        """Sets a motor that moves a joint at a velocity."""
         self.set_position_motors(number, [index], [0.0], [velocity], [effort], 0.0)
 
     def apply_effort(self, number: int, index: int, effort: float) -> None:
-        """Lets an effort act on a joint."""
+        """Applies an effort to a joint in the next step."""
         self._dynamics.data.qfrc_applied[self._span(number, index).dofs] += effort
 
     def measure_joint_load(self, number: int, index: int) -> None:
-        """Lets the loads on all joints be computed."""
+        """Enables the computation of the loads on all joints."""
         del number, index
         self._dynamics.measures_loads = True
 
     def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
-        """Returns what the link below a joint did to the one above."""
+        """Returns the load of the child link on the parent link of a joint; see `PhysicsEngine`."""
         return self._dynamics.load(self._bodies[number].ids[index + 1])
 
     # Saved states
 
     def save_state(self) -> _State:
-        """Copies the state."""
+        """Returns a copy of the state."""
         poses = {number: body.pose for number, body in self._bodies.items()}
         return _State(poses, self._dynamics.state())
 
     def restore_state(self, state: _State) -> None:
-        """Continues from a saved state; what touches is known again after the next step."""
+        """Continues from a saved state; contacts are unknown until the next step."""
         for number, pose in state.poses.items():
             if self._bodies[number].tree.fixed:
                 self.set_base_centre(number, pose)
         self._dynamics.set_state(state.dynamics)
 
     def forget_state(self, state: _State) -> None:
-        """Does nothing: a saved state is a copy."""
+        """Does nothing, because a saved state is a copy."""
 
 
-def _found(model: mujoco.MjModel, number: int, tree: BodyTree) -> tuple[list[int], list[_Span]]:
-    """Returns MuJoCo's numbers of the links of a body, and where the state of its joints is."""
+def _ids_and_spans(model: mujoco.MjModel, number: int, tree: BodyTree) -> tuple[list[int], list[_Span]]:
+    """Returns MuJoCo's body ids of a body's links, and the state slices of its joints.
+
+    Args:
+        model: Compiled model.
+        number: Id of the body.
+        tree: Links of the body.
+    """
     ids, spans = [], []
-    for rank, link in enumerate(tree.links):
-        ids.append(model.body(body_name(number, rank - 1)).id)
+    for position, link in enumerate(tree.links):
+        ids.append(model.body(body_name(number, position - 1)).id)
         free = link.joint is None and not tree.fixed
         kind = JointKind.FIXED if link.joint is None else link.joint.kind
         positions, dofs = (7, 6) if free else _WIDTHS.get(kind, (1, 1))
         begin = (0, 0)
         if dofs:
-            joint = model.joint(joint_name(number, rank - 1)).id
+            joint = model.joint(joint_name(number, position - 1)).id
             begin = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         spans.append(_Span(slice(begin[0], begin[0] + positions), slice(begin[1], begin[1] + dofs)))
     return ids, spans
 
 
 def _copy_motion(old: MujocoDynamics, body: _Body, new: MujocoDynamics, ids: list[int], spans: list[_Span]) -> None:
-    """Lets a body of a new model move as it does in the old one."""
-    for was, now in zip(body.spans, spans, strict=True):
-        new.data.qpos[now.positions] = old.data.qpos[was.positions]
+    """Copies the motion of a body from an old model to a new model.
+
+    Args:
+        old: Dynamics of the old model.
+        body: The body in the old model.
+        new: Dynamics of the new model.
+        ids: Body ids in the new model.
+        spans: State slices in the new model.
+    """
+    for old_span, new_span in zip(body.spans, spans, strict=True):
+        new.data.qpos[new_span.positions] = old.data.qpos[old_span.positions]
         for target, source in zip(new.by_dof(), old.by_dof(), strict=True):
-            target[now.dofs] = source[was.dofs]
+            target[new_span.dofs] = source[old_span.dofs]
     new.data.xfrc_applied[ids] = old.data.xfrc_applied[body.ids]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of links and joints in requests: scoped by their model, or alone where only one model has such a part."""
+"""Resolves names of links and joints in requests; the name of the model is optional for unique names."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from modular_framework_simulation.errors import AmbiguousNameError, UnknownEntit
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
 SCOPE = "::"
-"""Separates a model from its link or joint in the name of the latter, as in model::link."""
+"""Separator between the names of a model and its link or joint, as in model::link."""
 
 
 @dataclass(frozen=True, slots=True)
 class PartName:
-    """A link or a joint of a model.
+    """Name of a link or joint of a model.
 
     Attributes:
-        model: Instance name of the model.
+        model: Name of the model in the world.
         part: Name of the link or joint in the model.
     """
 
@@ -27,26 +27,26 @@ class PartName:
 
     @property
     def scoped(self) -> str:
-        """The full name: model::part."""
+        """Returns the full name, model::part."""
         return f"{self.model}{SCOPE}{self.part}"
 
 
 def find_link(bodies: Mapping[str, SimulatedBody], name: str) -> PartName:
-    """Returns the link of a name: "model::link", or "link" where one model has such a link.
+    """Returns the link with a name: "model::link", or "link" for a unique link name.
 
     Raises:
-        UnknownEntityError: No model has it.
-        AmbiguousNameError: Several have it.
+        UnknownEntityError: No model has the link.
+        AmbiguousNameError: Several models have the link.
     """
     return _find(bodies, "link", name, SimulatedBody.link_names)
 
 
 def find_joint(bodies: Mapping[str, SimulatedBody], name: str) -> PartName:
-    """Returns the joint of a name: "model::joint", or "joint" where one model has such a joint.
+    """Returns the joint with a name: "model::joint", or "joint" for a unique joint name.
 
     Raises:
-        UnknownEntityError: No model has it.
-        AmbiguousNameError: Several have it.
+        UnknownEntityError: No model has the joint.
+        AmbiguousNameError: Several models have the joint.
     """
     return _find(bodies, "joint", name, SimulatedBody.joint_names)
 
@@ -55,10 +55,10 @@ def _find(
     bodies: Mapping[str, SimulatedBody], kind: str, name: str, parts: Callable[[SimulatedBody], list[str]]
 ) -> PartName:
     model, separator, _ = name.rpartition(SCOPE)
-    scoping = [each for each in bodies if name.startswith(each + SCOPE)]  # names of models may hold the separator too
-    if separator and not scoping:
+    models_in_name = [each for each in bodies if name.startswith(each + SCOPE)]  # model names may contain the separator
+    if separator and not models_in_name:
         raise UnknownEntityError("model", model, list(bodies))
-    known = [PartName(each, own) for each in scoping or bodies for own in parts(bodies[each])]
+    known = [PartName(each, own) for each in models_in_name or bodies for own in parts(bodies[each])]
     found = [item for item in known if name in (item.scoped, item.part)]
     if not found:
         raise UnknownEntityError(kind, name, [item.scoped for item in known])
@@ -68,16 +68,16 @@ def _find(
 
 
 def find_frame(bodies: Mapping[str, SimulatedBody], name: str, world_frames: Collection[str]) -> str:
-    """Returns the full name of what a request gives poses relative to: the world, a model, or a link.
+    """Returns the full name of a reference frame in a request: the world, a model, or a link.
 
     Args:
-        bodies: The models by name.
-        name: "model", "model::link", or "link" where one model has such a link.
-        world_frames: Names of the world.
+        bodies: Models by name.
+        name: "model", "model::link", or "link" for a unique link name.
+        world_frames: Names of the world frame.
 
     Raises:
-        UnknownEntityError: There is no such model or link.
-        AmbiguousNameError: Several models have such a link.
+        UnknownEntityError: The model or link does not exist.
+        AmbiguousNameError: Several models have the link.
     """
     if name in world_frames or name in bodies:
         return name

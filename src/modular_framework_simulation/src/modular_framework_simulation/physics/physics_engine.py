@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the simulated world asks of a physics engine; `engine_choice` says which engines there are.
+"""Interface between the simulated world and a physics engine; `engine_choice` lists the engines.
 
-Bodies are trees of links, numbered by the engine. Link 0 and the joint 0 above it come first in the tree; the root is
-`BASE_INDEX`. Poses and velocities are in the world frame [m, rad, m/s, rad/s], quaternions xyzw. The centre of a link
-is the frame in its centre of mass whose axes are those of its inertia. All calls come from one thread.
+Bodies are trees of links and have ids that the engine assigns. Link indices start at 0, and each joint has the index of
+its child link; the root link has the index `BASE_INDEX`. Poses and velocities are in the world frame [m, rad, m/s,
+rad/s], quaternions are xyzw. The centre of a link is a frame in the centre of mass along the inertia axes. All calls
+must come from one thread.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.rotations import Quaternion, Vector3
 
 BASE_INDEX = -1
-"""The number of a body's root link."""
+"""Index of a body's root link."""
 
 REST_LOOK_S = 0.1
-"""Period with which an engine that lets bodies rest looks which of them do [s of simulated time]."""
+"""Period with which an engine checks for sleeping bodies [s of simulated time]."""
 
-LONGEST_NAME_BYTES = 1023
-"""PyBullet copies names and file names into arrays of 1,024 bytes without checking their length, and crashes."""
+MAX_NAME_BYTES = 1023
+"""Maximum length of names and file names; PyBullet copies them into arrays of 1,024 bytes without a check."""
 
-SHOWN_CHARACTERS = 40
-"""Of a name in a message."""
+MAX_SHOWN_CHARACTERS = 40
+"""Maximum number of characters of a name in a message."""
 _NAMING_ATTRIBUTES = ("name", "link", "filename")
 
 Log = Callable[[str], None]
 
 
 class JointKind(Enum):
-    """How a joint moves."""
+    """Type of a joint's motion."""
 
     FIXED = "fixed"
     REVOLUTE = "revolute"
@@ -51,17 +52,17 @@ class JointKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EngineJoint:
-    """A joint as the engine has it.
+    """Joint in the engine.
 
     Attributes:
-        index: Its number, and that of the link below it.
-        name: Its name.
-        child_link: Name of the link below it.
-        kind: How it moves.
-        lower: Lower limit, -inf without [rad or m].
-        upper: Upper limit, inf without [rad or m].
-        damping: Of its description [Nm s/rad or N s/m].
-        friction: Of its description [Nm or N].
+        index: Index of the joint and of its child link.
+        name: Name of the joint.
+        child_link: Name of the child link.
+        kind: Type of the motion.
+        lower: Lower limit, or -inf [rad or m].
+        upper: Upper limit, or inf [rad or m].
+        damping: Damping in the description [Nm s/rad or N s/m].
+        friction: Friction in the description [Nm or N].
     """
 
     index: int
@@ -75,7 +76,7 @@ class EngineJoint:
 
 
 class JointState(NamedTuple):
-    """Position [rad or m], velocity [rad/s or m/s], and what its motor did in the last step [Nm or N]."""
+    """Position [rad or m], velocity [rad/s or m/s] and motor effort in the last step [Nm or N] of a joint."""
 
     position: float
     velocity: float
@@ -83,7 +84,7 @@ class JointState(NamedTuple):
 
 
 class LinkMotion(NamedTuple):
-    """Where the centre and the frame of a link are, and how the centre moves."""
+    """Poses of the centre and the frame of a link, and linear and angular velocity of the centre."""
 
     centre: Pose
     frame: Pose
@@ -92,7 +93,7 @@ class LinkMotion(NamedTuple):
 
 
 class MassProperties(NamedTuple):
-    """Mass [kg] (0: fastened to the world), moments about the axes of the centre [kg m^2], centre in the link frame."""
+    """Mass [kg] (0 for a fixed root), moments about the inertia axes [kg m^2], and centre in the link frame."""
 
     mass: float
     moments: Vector3
@@ -100,7 +101,7 @@ class MassProperties(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A point where a link touches another body: that body's number, normal force [N], distance [m] (< 0: inside)."""
+    """Contact with another body: its id, normal force [N] and distance [m], which is negative for penetration."""
 
     other: int
     force: float
@@ -109,15 +110,15 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EngineContact:
-    """A point where two links touch, in the world.
+    """Contact point between two links, in the world frame.
 
     Attributes:
-        number: Of the other body.
-        index: Of its link.
-        position: Half way between the two surfaces [m].
-        normal: Unit vector out of the other body.
-        distance: Negative when they are in each other [m].
-        force: On the first link, friction too [N].
+        number: Id of the other body.
+        index: Index of the other link.
+        position: Midpoint between the two surfaces [m].
+        normal: Unit normal that points out of the other body.
+        distance: Distance [m], negative for penetration.
+        force: Force on the first link, including friction [N].
     """
 
     number: int
@@ -130,7 +131,7 @@ class EngineContact:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Coefficients of a link; see `specs.Friction`, `specs.Bounce` and `specs.SurfaceContact`."""
+    """Surface coefficients of a link, see `specs.Friction`, `specs.Bounce` and `specs.SurfaceContact`."""
 
     lateral: float
     spinning: float
@@ -141,32 +142,32 @@ class Surface:
 
 
 def refuse_long_names(text: str, where: str) -> None:
-    """Raises DescriptionError where a URDF holds a name, or the name of a file, that an engine has no room for.
+    """Raises DescriptionError if a name or file name in a URDF is too long for an engine.
 
     Args:
-        text: The URDF.
-        where: Named in the error.
+        text: URDF text.
+        where: Location for the error message.
     """
     for element in xml_text.parse(text, where).iter():
         for key in _NAMING_ATTRIBUTES:
             value = element.get(key, "")
             size = len(value.encode())
-            if size > LONGEST_NAME_BYTES:
+            if size > MAX_NAME_BYTES:
                 raise DescriptionError(
-                    f"{where}: <{element.tag} {key}='{value[:SHOWN_CHARACTERS]}...'>",
+                    f"{where}: <{element.tag} {key}='{value[:MAX_SHOWN_CHARACTERS]}...'>",
                     f"is {size:,} bytes long",
-                    f"the physics engine takes at most {LONGEST_NAME_BYTES:,} bytes; use a shorter name",
+                    f"the physics engine takes at most {MAX_NAME_BYTES:,} bytes; use a shorter name",
                 )
 
 
 class PhysicsEngine(ABC):
-    """A physics engine.
+    """Physics engine.
 
     Attributes:
-        name: As the parameter ~physics_engine has it.
-        settings: Its numbers.
-        has_window: Whether it shows what it simulates.
-        takes_concave_meshes: Whether the shapes of bodies that never move may be meshes that are not convex.
+        name: Name of the engine in the parameter ~physics_engine.
+        settings: Settings of the engine.
+        has_window: Whether the engine shows the simulation in a window.
+        takes_concave_meshes: Whether static bodies may have concave meshes.
     """
 
     name: str
@@ -178,39 +179,48 @@ class PhysicsEngine(ABC):
 
     @abstractmethod
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
-        """Continues with other settings and gravity [m/s^2]."""
+        """Changes settings and gravity.
+
+        Args:
+            settings: Settings of the engine.
+            gravity: Gravity vector in the world frame [m/s^2].
+        """
 
     @abstractmethod
     def restart(self, gravity: Vector3) -> None:
-        """Takes everything out, contacts and their caches too; gravity in m/s^2."""
+        """Removes all bodies, contacts and caches.
+
+        Args:
+            gravity: Gravity vector in the world frame [m/s^2].
+        """
 
     @abstractmethod
     def step(self) -> None:
-        """Advances the physics by one time step; forces and efforts that were applied end with it."""
+        """Advances the physics by one time step; applied forces and efforts end with the step."""
 
     @abstractmethod
     def resting(self) -> Collection[int]:
-        """Returns the bodies that have not moved for REST_LOOK_S; a touch that moved one is noticed in that time."""
+        """Returns the sleeping bodies; motion of a sleeping body is detected within REST_LOOK_S."""
 
     @abstractmethod
     def save_state(self) -> Any:
-        """Returns the state of motion of everything, for `restore_state` while the same bodies are there.
+        """Returns the state of all bodies, which `restore_state` can restore while the bodies are the same.
 
         Raises:
-            SimulationError: The engine leaves bodies at rest out (`rest_speed`), which is no part of its state.
+            SimulationError: The engine lets bodies sleep (`rest_speed`), which is not part of its state.
         """
 
     @abstractmethod
     def restore_state(self, state: Any) -> None:
-        """Continues from a saved state, bit for bit as from the first time."""
+        """Continues from a saved state, with bitwise identical results."""
 
     @abstractmethod
     def forget_state(self, state: Any) -> None:
-        """Frees a saved state."""
+        """Deletes a saved state."""
 
     @abstractmethod
     def close(self) -> None:
-        """Ends the engine; may be called twice."""
+        """Closes the engine; may be called twice."""
 
     # Bodies
 
@@ -220,20 +230,20 @@ class PhysicsEngine(ABC):
 
         Args:
             text: URDF with absolute mesh paths.
-            name: Named in the error.
-            fixed: Whether its root link is fastened to the world.
-            self_collision: Whether its links touch each other.
+            name: Name of the model for the error message.
+            fixed: Whether the root link is fixed to the world.
+            self_collision: Whether the links collide with each other.
 
         Returns:
-            The number of the body.
+            Id of the body.
 
         Raises:
-            DescriptionError: The engine refuses the description, or has no room for a name in it.
+            DescriptionError: The engine rejects the description, or a name is too long for the engine.
         """
 
     @abstractmethod
     def remove_body(self, number: int) -> None:
-        """Takes a body out."""
+        """Removes a body."""
 
     @abstractmethod
     def root_link(self, number: int) -> str:
@@ -241,43 +251,43 @@ class PhysicsEngine(ABC):
 
     @abstractmethod
     def joints(self, number: int) -> list[EngineJoint]:
-        """Returns every joint of a body, fixed ones too, in the order of their numbers."""
+        """Returns all joints of a body, including fixed joints, sorted by index."""
 
     @abstractmethod
     def mass_properties(self, number: int, index: int) -> MassProperties:
-        """Returns the mass and its distribution in a link."""
+        """Returns the mass properties of a link."""
 
     @abstractmethod
     def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
-        """Returns the joint space inertia where the joints are now; the last rows are those of the movable joints.
+        """Returns the joint space inertia matrix at the current positions; the last rows are the movable joints.
 
         Args:
-            number: A body without ball joints.
-            indices: All its joints that turn or slide.
+            number: Id of a body without ball joints.
+            indices: Indices of all revolute and prismatic joints.
         """
 
     @abstractmethod
     def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
-        """Sets which pairs of links of a body loaded with `self_collision` touch each other; the others do not."""
+        """Sets the pairs of links that collide in a body loaded with `self_collision`; other pairs do not collide."""
 
     @abstractmethod
     def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
         """Sets friction, bounce and softness of a link.
 
         Args:
-            number: The body.
-            index: The link.
-            surface: Its coefficients; of a contact, the smaller ones of friction and restitution count.
-            anchored: Whether touches remember where they began, see `PhysicsSettings.friction_erp`.
+            number: Id of the body.
+            index: Index of the link.
+            surface: Coefficients; a contact uses the smaller friction and restitution of its two surfaces.
+            anchored: Whether contacts have friction anchors, see `PhysicsSettings.friction_erp`.
         """
 
     @abstractmethod
     def remove_margin(self, number: int, index: int) -> None:
-        """Lets the shapes of a link touch where they are, for engines that keep shapes apart by a margin."""
+        """Removes the collision margin of a link's shapes, for engines with margins."""
 
     @abstractmethod
     def remove_velocity_damping(self, number: int) -> None:
-        """Lets a body spin and fly freely, for engines that brake every body."""
+        """Removes the velocity damping of a body, for engines that damp all bodies."""
 
     # Motion
 
@@ -291,65 +301,103 @@ class PhysicsEngine(ABC):
 
     @abstractmethod
     def set_base_centre(self, number: int, pose: Pose) -> None:
-        """Puts a body somewhere, its root link at rest."""
+        """Sets the pose of the root link's centre, with the root link at rest."""
 
     @abstractmethod
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
-        """Sets the velocity of the root link's centre."""
+        """Sets the velocity of the root link's centre of mass.
+
+        Args:
+            number: Id of the body.
+            linear: Linear velocity in the world frame [m/s].
+            angular: Angular velocity in the world frame [rad/s].
+        """
 
     @abstractmethod
     def link_motion(self, number: int, index: int) -> LinkMotion:
-        """Returns where a link other than the root is and how it moves."""
+        """Returns pose and velocity of a link other than the root."""
 
     @abstractmethod
     def weld(self, number: int, index: int, other: int) -> int:
-        """Fastens the root link of another body to a link, as both are now.
+        """Welds the root link of another body to a link, at their current relative pose.
+
+        Args:
+            number: Id of the body with the link.
+            index: Index of the link.
+            other: Id of the other body.
 
         Returns:
-            The number of the weld.
+            Id of the weld.
         """
 
     @abstractmethod
     def remove_weld(self, weld: int) -> None:
-        """Ends a weld; to be called before one of its bodies is taken out."""
+        """Removes a weld; must be called before one of its bodies is removed."""
 
     @abstractmethod
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
-        """Lets a force [N] act at a point of a link in the coming step, both in the world frame."""
+        """Applies a force at a point of a link in the next step.
+
+        Args:
+            number: Id of the body.
+            index: Index of the link.
+            force: Force in the world frame [N].
+            point: Point in the world frame [m].
+        """
 
     @abstractmethod
     def touches(self, number: int, index: int) -> list[Touch]:
-        """Returns where a link touched others in the last step; also where it was just near, with force 0."""
+        """Returns the contacts of a link with other bodies in the last step; a near body has force 0."""
 
     @abstractmethod
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
-        """Returns where a link touched others in the last step, with the whole force; not where it was just near."""
+        """Returns the contact points of a link in the last step, with forces; near bodies are left out."""
 
     # Joints
 
     @abstractmethod
     def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
-        """Returns the states of joints that turn or slide."""
+        """Returns the states of revolute and prismatic joints."""
 
     @abstractmethod
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
-        """Puts a joint somewhere, moving."""
+        """Sets the state of a joint.
+
+        Args:
+            number: Id of the body.
+            index: Index of the joint.
+            position: Position [rad or m].
+            velocity: Velocity [rad/s or m/s].
+        """
 
     @abstractmethod
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
-        """Returns rotation and angular velocity of a ball joint."""
+        """Returns rotation (quaternion xyzw) and angular velocity [rad/s] of a ball joint."""
 
     @abstractmethod
     def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
-        """Puts a ball joint somewhere, moving."""
+        """Sets the state of a ball joint.
+
+        Args:
+            number: Id of the body.
+            index: Index of the joint.
+            turn: Rotation, quaternion xyzw.
+            rate: Angular velocity [rad/s].
+        """
 
     @abstractmethod
     def release_ball_joint(self, number: int, index: int) -> None:
-        """Lets a ball joint turn freely, for engines that brake it with a motor of their own."""
+        """Removes the default motor of a ball joint, for engines with default motors."""
 
     @abstractmethod
     def set_joint_damping(self, number: int, index: int, damping: float) -> None:
-        """Sets the resistance of a joint per velocity, as the explicit step has it [Nm s/rad or N s/m]."""
+        """Sets the viscous damping of a joint in the explicit step.
+
+        Args:
+            number: Id of the body.
+            index: Index of the joint.
+            damping: Damping [Nm s/rad or N s/m].
+        """
 
     @abstractmethod
     def set_position_motors(
@@ -361,32 +409,45 @@ class PhysicsEngine(ABC):
         efforts: Sequence[float],
         gain: float,
     ) -> None:
-        """Lets motors move joints to positions, with at most their effort.
+        """Sets motors that move joints to positions within their maximum effort.
 
         Args:
-            number: The body.
-            indices: The joints.
-            targets: Positions [rad or m].
-            velocities: Fed forward [rad/s or m/s].
-            efforts: Most that each motor has [Nm or N].
-            gain: Share of a position error that is corrected in one step.
+            number: Id of the body.
+            indices: Indices of the joints.
+            targets: Target positions [rad or m].
+            velocities: Feed-forward velocities [rad/s or m/s].
+            efforts: Maximum efforts [Nm or N].
+            gain: Fraction of a position error that is corrected in one step.
         """
 
     @abstractmethod
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
-        """Lets a motor bring a joint to a velocity [rad/s or m/s] with at most an effort [Nm or N]."""
+        """Sets a motor that moves a joint at a velocity.
+
+        Args:
+            number: Id of the body.
+            index: Index of the joint.
+            velocity: Target velocity [rad/s or m/s].
+            effort: Maximum effort [Nm or N].
+        """
 
     @abstractmethod
     def apply_effort(self, number: int, index: int, effort: float) -> None:
-        """Lets an effort [Nm or N] act on a joint in the coming step, besides that of its motor; several add up."""
+        """Adds an effort to a joint in the next step, in addition to its motor and other efforts.
+
+        Args:
+            number: Id of the body.
+            index: Index of the joint.
+            effort: Effort [Nm or N].
+        """
 
     @abstractmethod
     def measure_joint_load(self, number: int, index: int) -> None:
-        """Lets `joint_load` be measured in the coming steps."""
+        """Enables `joint_load` for the next steps."""
 
     @abstractmethod
     def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
-        """Returns the force [N] and torque [Nm] with which the link below a joint acted on the one above, last step.
+        """Returns the force [N] and torque [Nm] of a joint's child link on the parent link in the last step.
 
-        Both are in the axes of the link below, about its origin.
+        Both are in the frame of the child link, and the torque is about its origin.
         """

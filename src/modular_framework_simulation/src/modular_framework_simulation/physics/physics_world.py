@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulated world: models in it, and time that advances one physics step at a call.
+"""Simulated world with its models; each call of `step` advances time by one physics step.
 
-All calls come from one thread, the one that owns the loop.
+All calls must come from the thread that owns the loop.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from modular_framework_simulation.physics.world_rest import WorldRest
 from modular_framework_urdf.rotations import Vector3
 
 WORLD_FRAMES = ("", "world", "map", "/map")
-"""Names that stand for the frame of the world in requests."""
+"""Names of the world frame in requests."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A touch between two links.
+    """Contact between two links.
 
     Attributes:
-        model: The other model.
+        model: Name of the other model.
         force: Normal force [N].
-        distance: Negative when they penetrate [m].
+        distance: Distance [m], negative for penetration.
     """
 
     model: str
@@ -52,15 +52,15 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class ContactPoint:
-    """A point where a link touches another one, in the world.
+    """Contact point between two links, in the world frame.
 
     Attributes:
-        model: The other model.
-        other_link: Its link; of a static model, which is one body for the engine, any of its links.
-        position: Half way between the two surfaces [m].
-        normal: Unit vector out of the other model.
-        depth: How deep they are in each other [m].
-        force: On the link, friction too [N].
+        model: Name of the other model.
+        other_link: Name of the other link; for a static model, which is one body in the engine, any of its links.
+        position: Midpoint between the two surfaces [m].
+        normal: Unit normal that points out of the other model.
+        depth: Penetration depth [m].
+        force: Force on the link, including friction [N].
     """
 
     model: str
@@ -73,39 +73,39 @@ class ContactPoint:
 
 @dataclass(frozen=True, slots=True)
 class WorldState:
-    """A saved state of the world.
+    """Saved state of the world.
 
     Attributes:
-        engine: What the engine saved.
-        numbers: Its numbers of the bodies, by model.
-        welded: What is fastened to hands: model and link.
-        steps: Physics steps until then.
+        engine: State saved by the engine.
+        body_ids: Engine body ids, keyed by model name.
+        welds: Welds between objects and grippers, as (model, link) pairs.
+        steps: Number of physics steps.
         time_ns: Simulated time [ns].
-        forces: Of requests.
+        forces: Forces of requests.
     """
 
     engine: Any
-    numbers: dict[str, tuple[int, ...]]
-    welded: tuple[tuple[str, str], ...]
+    body_ids: dict[str, tuple[int, ...]]
+    welds: tuple[tuple[str, str], ...]
     steps: int
     time_ns: int
     forces: SavedForces
 
 
 class PhysicsWorld:
-    """Models, a robot or two, and simulated time.
+    """Models, robots and simulated time.
 
     Args:
-        settings: Numbers of the physics engine.
-        convex_parts: Cuts meshes for the engine.
-        gravity: [m/s^2]
-        gui: Whether to open a window, if there is a display.
-        log: Takes lines of text about what was decided.
+        settings: Settings of the physics engine.
+        convex_parts: Converter of meshes for the engine.
+        gravity: Gravity vector in the world frame [m/s^2].
+        gui: Whether to open a window if a display is available.
+        log: Function that logs a decision.
         engine: Name of the physics engine, see `engine_choice`.
-        weld_grasps: Whether objects that a gripper holds are fastened to it; else friction alone holds them.
+        weld_grasps: Whether held objects are welded to the gripper; otherwise only friction holds them.
 
     Raises:
-        SimulationError: There is no such engine, or it cannot be used.
+        SimulationError: The engine is unknown or not available.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class PhysicsWorld:
         self._log = log
         self._noted: set[tuple[str, ...]] = set()
         self._bodies: dict[str, SimulatedBody] = {}
-        self._names_by_number: dict[int, str] = {}
+        self._names_by_body_id: dict[int, str] = {}
         self._initial_poses: dict[str, Pose] = {}
         self._instances: dict[str, int] = {}
         self._last_instance = 0
@@ -137,32 +137,32 @@ class PhysicsWorld:
         self.weld_grasps = weld_grasps
         self._carried: dict[tuple[str, str], CarriedObject] = {}
         self._welds: dict[tuple[str, str], int] = {}
-        self._steps = self._time_ns = self._computed_until = 0
+        self._steps = self._time_ns = self._last_computed_step = 0
         self.revision = 0
-        """Changes whenever a model is spawned, deleted or moved by a request."""
+        """Revision number, which changes when a request spawns, deletes or moves a model."""
 
     @property
     def time_ns(self) -> int:
-        """Simulated time [ns] since the start or the last reset."""
+        """Returns the simulated time since the start or the last reset [ns]."""
         return self._time_ns
 
     @property
     def steps(self) -> int:
-        """Physics steps since the start or the last reset."""
+        """Returns the number of physics steps since the start or the last reset."""
         return self._steps
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves and nothing is to move it: the coming step is not computed then."""
+        """Returns whether nothing moves and no force is pending, so that the next step is not computed."""
         return self.rest.holds and not self.forces.pending
 
     def step(self) -> None:
-        """Advances the world by one time step; a world in which everything is at rest is not computed."""
+        """Advances the world by one time step; a world at rest is not computed."""
         if not self.at_rest:
-            if self.forces.pending or self.engine.has_window:  # in a window, the mouse moves bodies
+            if self.forces.pending or self.engine.has_window:  # the user may move bodies with the mouse
                 self.rest.disturb()
             self._compute_step()
-            self._computed_until = self._steps + 1
+            self._last_computed_step = self._steps + 1
             self.rest.after_step(self._bodies.values())
         self._steps += 1
         self._time_ns += self.settings.time_step_ns
@@ -179,16 +179,16 @@ class PhysicsWorld:
             carried.after_step()
 
     def set_physics(self, settings: PhysicsSettings, gravity: Vector3) -> None:
-        """Continues with other settings, until `restart`.
+        """Changes settings until the next `restart`.
 
         Args:
-            settings: Numbers of the physics engine.
-            gravity: [m/s^2]
+            settings: Settings of the physics engine.
+            gravity: Gravity vector in the world frame [m/s^2].
         """
         self.engine.adjust(settings, gravity)
         self.rest.disturb()
         self.settings, self.gravity = settings, gravity
-        for body in self._bodies.values():  # how surfaces and joints resist depends on the step
+        for body in self._bodies.values():  # surface and joint parameters depend on the time step
             if body.spec is not None:
                 for part in body.parts:
                     self._set_properties(part, body.spec)
@@ -196,41 +196,41 @@ class PhysicsWorld:
                     apply_settings(self.engine, body, joint, values)
 
     def note_change(self) -> None:
-        """Says that a request has changed something in the world."""
+        """Records that a request has changed the world."""
         self.revision += 1
         self.rest.disturb()
 
     def moving(self) -> set[str]:
-        """Returns the names of the models that are not known to have been at rest for REST_LOOK_S."""
-        if (self._steps - self._computed_until) * self.settings.time_step_s > REST_LOOK_S:
+        """Returns the names of the models that may have moved within the last REST_LOOK_S."""
+        if (self._steps - self._last_computed_step) * self.settings.time_step_s > REST_LOOK_S:
             return set()
-        return {self._names_by_number[number] for number in self._names_by_number.keys() - self.engine.resting()}
+        return {self._names_by_body_id[number] for number in self._names_by_body_id.keys() - self.engine.resting()}
 
     @property
     def bodies(self) -> Mapping[str, SimulatedBody]:
-        """All models by name, in order of appearance; a view."""
+        """Returns a read-only view of all models by name, in order of appearance."""
         return MappingProxyType(self._bodies)
 
     def carry(self, robot: SimulatedBody, held: Sequence[tuple[str, str]]) -> None:
-        """Sets which models move with a hand from now on: those that are held.
+        """Sets the held models, which move with the gripper from now on.
 
         Args:
-            robot: The robot that holds them.
-            held: Model and the robot's link that carries it, of each.
+            robot: The robot that holds the models.
+            held: Pairs of the held model and the robot link that carries it.
         """
         if tuple(self._welds if self.weld_grasps else self._carried) == tuple(held):
             return
         self.rest.disturb()
-        self._let_go()
+        self._release()
         for name, link in held:
-            thing, index = self.body(name), robot.link_indices[link]
+            held_body, index = self.body(name), robot.link_indices[link]
             if self.weld_grasps:
-                self._welds[name, link] = self.engine.weld(robot.number, index, thing.number)
+                self._welds[name, link] = self.engine.weld(robot.number, index, held_body.number)
             elif index != BASE_INDEX:
-                self._carried[name, link] = CarriedObject(self.engine, thing, robot, index)
+                self._carried[name, link] = CarriedObject(self.engine, held_body, robot, index)
 
-    def _let_go(self, name: str = "") -> None:
-        """Lets hands carry a model no more; without a name, all of them."""
+    def _release(self, name: str = "") -> None:
+        """Releases a held model; without a name, all held models."""
         for key in [each for each in (*self._carried, *self._welds) if name in ("", each[0])]:
             self._carried.pop(key, None)
             if key in self._welds:
@@ -244,7 +244,7 @@ class PhysicsWorld:
         """Returns a model.
 
         Raises:
-            UnknownEntityError: There is no such model.
+            UnknownEntityError: The model does not exist.
         """
         body = self._bodies.get(name)
         if body is None:
@@ -252,10 +252,10 @@ class PhysicsWorld:
         return body
 
     def prepare(self, model: specs.Model) -> BodyUrdf:
-        """Translates a model for the engine, which may take seconds for a large mesh; any thread may do it.
+        """Converts a model for the engine, which may take seconds for a large mesh; may be called from any thread.
 
         Raises:
-            DescriptionError: A mesh cannot be used.
+            DescriptionError: A mesh is unsupported or invalid.
         """
         concave = self.engine.takes_concave_meshes
         return model_to_urdf(model, self._convex_parts, self.engine.has_window, concave)
@@ -264,29 +264,29 @@ class PhysicsWorld:
         """Adds a model at its pose.
 
         Args:
-            model: What to add.
-            prepared: What `prepare` made of it, if that was called before.
-            keep: Whether it belongs to the world as `restart` makes it.
+            model: Description of the model.
+            prepared: Result of `prepare` for the model; None to convert the model now.
+            keep: Whether the model belongs to the initial world, which `restart` restores.
 
         Raises:
-            DuplicateModelError: Its name is taken.
-            DescriptionError: The engine cannot represent it.
+            DuplicateModelError: The name is already in use.
+            DescriptionError: The engine cannot represent the model.
         """
         if model.name in self._bodies:
             raise DuplicateModelError(model.name)
-        written = prepared if prepared is not None else self.prepare(model)
+        urdf = prepared if prepared is not None else self.prepare(model)
         if model.notes and model.notes not in self._noted:
             self._noted.add(model.notes)
             self._log(f"model '{model.name}': {'; '.join(model.notes)}")
-        body = self._load(model, written)
+        body = self._load(model, urdf)
         self.add(body, model.pose)
         if keep:
-            self._initial.append((model, written))
+            self._initial.append((model, urdf))
         return body
 
-    def _load(self, model: specs.Model, written: BodyUrdf) -> SimulatedBody:
+    def _load(self, model: specs.Model, urdf: BodyUrdf) -> SimulatedBody:
         parts = []
-        for tree in (written, *written.further):
+        for tree in (urdf, *urdf.further):
             number = self.engine.load_urdf(tree.text, model.name, tree.fixed)
             parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
             parts[-1].release_ball_joints()
@@ -296,42 +296,42 @@ class PhysicsWorld:
         return body
 
     def replace(self, model: specs.Model, prepared: BodyUrdf) -> None:
-        """Gives a model another description; it goes on moving as it does, joints within their limits.
+        """Replaces the description of a model; its motion continues, with joints within the new limits.
 
         Args:
-            model: Has the name of the model that it takes the place of, and its links and joints.
-            prepared: What `prepare` made of it.
+            model: New description, with the name, links and joints of the existing model.
+            prepared: Result of `prepare` for the new description.
 
         Raises:
-            UnknownEntityError: There is no such model.
-            DescriptionError: The engine cannot represent it; nothing has changed then.
+            UnknownEntityError: The model does not exist.
+            DescriptionError: The engine cannot represent the model; nothing has changed.
         """
         old = self.body(model.name)
         body = self._load(model, prepared)
-        for before, part in zip(old.parts, body.parts, strict=True):  # the first one takes the others along
-            part.set_state(before.state())
-            copy_joint_motion(self.engine, before, part)
+        for old_part, part in zip(old.parts, body.parts, strict=True):  # moving the first tree also moves the others
+            part.set_state(old_part.state())
+            copy_joint_motion(self.engine, old_part, part)
         self._remove(old)
         self._bodies[model.name] = body
-        self._names_by_number.update({part.number: model.name for part in body.parts})
+        self._names_by_body_id.update({part.number: model.name for part in body.parts})
         self.note_change()
 
     def _remove(self, body: SimulatedBody) -> None:
-        self._let_go(body.name)
+        self._release(body.name)
         for part in body.parts:
             self.engine.remove_body(part.number)
-            del self._names_by_number[part.number]
+            del self._names_by_body_id[part.number]
             self._forces.pop(part.number, None)
 
     def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
         """Adds a body that is already in the engine, at a pose in the world frame."""
         if body.name in self._bodies:
             raise DuplicateModelError(body.name)
-        body.put_together(pose_in_world)
+        body.place_at_rest(pose_in_world)
         self._bodies[body.name] = body
         self._last_instance += 1
         self._instances[body.name] = self._last_instance
-        self._names_by_number.update({part.number: body.name for part in body.parts})
+        self._names_by_body_id.update({part.number: body.name for part in body.parts})
         self._initial_poses[body.name] = pose_in_world
         self.note_change()
 
@@ -339,7 +339,7 @@ class PhysicsWorld:
         """Removes a model.
 
         Raises:
-            UnknownEntityError: There is no such model.
+            UnknownEntityError: The model does not exist.
         """
         body = self.body(name)
         self._remove(body)
@@ -348,32 +348,32 @@ class PhysicsWorld:
         self.note_change()
 
     def entity_state(self, entity: str) -> BodyState:
-        """Returns where a model or a link ("model::link") is in the world and how it moves.
+        """Returns pose and twist of a model or a link ("model::link") in the world frame.
 
         Raises:
-            UnknownEntityError: There is no such model or link.
+            UnknownEntityError: The model or link does not exist.
         """
         if entity in WORLD_FRAMES:
             return BodyState(Pose(), Twist())
         if entity in self._bodies:
             return self._bodies[entity].state()
         model, separator, link = entity.partition(SCOPE)
-        while separator:  # a link of an inner model has the separator in its name, and so may the name of a model
+        while separator:  # names of models and of links of inner models may contain the separator
             if model in self._bodies:
                 return self._bodies[model].link_state(link)
-            following, separator, link = link.partition(SCOPE)
-            model += SCOPE + following
+            next_part, separator, link = link.partition(SCOPE)
+            model += SCOPE + next_part
         raise UnknownEntityError("model", entity, self.names())
 
     def state_relative_to(self, entity: str, reference: str) -> BodyState:
-        """Returns the state of a model or link as seen from another one.
+        """Returns the state of a model or link relative to another model or link.
 
         Args:
             entity: Model, or "model::link".
             reference: Model, "model::link", or the world.
 
         Raises:
-            UnknownEntityError: One of them does not exist.
+            UnknownEntityError: The entity or the reference does not exist.
         """
         state, frame = self.entity_state(entity), self.entity_state(reference)
         if reference in WORLD_FRAMES:
@@ -384,11 +384,11 @@ class PhysicsWorld:
         return BodyState(frame.pose.inverse() @ state.pose, twist_in_frame(relative, frame.pose))
 
     def set_state(self, name: str, state: BodyState, reference: str = "") -> None:
-        """Puts a model somewhere.
+        """Sets pose and twist of a model.
 
         Args:
-            name: The model.
-            state: Seen from the reference.
+            name: Name of the model.
+            state: State relative to the reference.
             reference: Model, "model::link", or the world.
 
         Raises:
@@ -399,9 +399,9 @@ class PhysicsWorld:
         self.note_change()
 
     def state_in_world(self, state: BodyState, reference: str) -> BodyState:
-        """Returns a state given in a reference as one in the world.
+        """Converts a state relative to a reference into a state in the world frame.
 
-        As in gazebo_ros, the twist is turned into the axes of the world; the motion of the reference is not added.
+        As in gazebo_ros, the twist is only rotated into the world frame; the motion of the reference is not added.
 
         Raises:
             UnknownEntityError: The reference does not exist.
@@ -410,42 +410,42 @@ class PhysicsWorld:
         return BodyState(frame @ state.pose, twist_in_frame(state.twist, frame.inverse()))
 
     def pose_in_world(self, pose: Pose, reference: str) -> Pose:
-        """Returns a pose given in a reference as a pose in the world."""
+        """Converts a pose in the frame of a reference into a pose in the world frame."""
         return self.entity_state(reference).pose @ pose
 
     def contacts(self, body: SimulatedBody, link_index: int) -> list[Contact]:
-        """Returns what touches a link, other links of its own body left out."""
+        """Returns the contacts of a link, except contacts with links of its own body."""
         return [
-            Contact(self._names_by_number[touch.other], touch.force, touch.distance)
+            Contact(self._names_by_body_id[touch.other], touch.force, touch.distance)
             for touch in self.engine.touches(body.number, link_index)
-            if touch.other in self._names_by_number
+            if touch.other in self._names_by_body_id
         ]
 
     def contact_points(self, model: str, link: str) -> list[ContactPoint]:
-        """Returns where a link touches others, as the last physics step had it.
+        """Returns the contact points of a link in the last physics step.
 
         Args:
-            model: The model.
-            link: Its link; for a static model, which is one body for the engine, any of its links.
+            model: Name of the model.
+            link: Name of the link; for a static model, which is one body in the engine, any of its links.
 
         Raises:
-            UnknownEntityError: There is no such model or link.
+            UnknownEntityError: The model or link does not exist.
         """
         body = self.body(model)
         tree = body if body.static and body.spec is not None else tree_with_link(body, link)
         found = []
         for point in self.engine.contact_points(tree.number, tree.link_indices.get(link, BASE_INDEX)):
-            name = self._names_by_number.get(point.number)
+            name = self._names_by_body_id.get(point.number)
             if name is not None:
-                other = self._bodies[name].link_of_number(point.number, point.index)
+                other = self._bodies[name].link_name_of(point.number, point.index)
                 found.append(ContactPoint(name, other, point.position, point.normal, -point.distance, point.force))
         return found
 
     def centre_of_mass(self, model: str, link: str) -> Vector3:
-        """Returns the centre of mass of a link in the world [m]; the origin of a link that never moves.
+        """Returns the centre of mass of a link in the world frame [m]; for a static link, the origin of the link.
 
         Raises:
-            UnknownEntityError: There is no such model or link.
+            UnknownEntityError: The model or link does not exist.
         """
         body = self.body(model)
         if body.static and body.spec is not None:
@@ -453,32 +453,32 @@ class PhysicsWorld:
         return centre_in_world(self.engine, body, link).position
 
     def reset_poses(self) -> None:
-        """Puts every model where it first appeared, at rest; joints of models go to 0; forces of requests end."""
+        """Resets all models to their initial poses at rest, with joints at 0, and removes the forces of requests."""
         self.forces.clear()
-        self._let_go()
+        self._release()
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
-                body.put_together(self._initial_poses[name])
+                body.place_at_rest(self._initial_poses[name])
         self.note_change()
 
     def instance(self, name: str) -> int:
-        """Returns a number that no other model has or had, also after a restart.
+        """Returns the unique number of a model, which no other model has or had, even before a restart.
 
         Raises:
-            UnknownEntityError: There is no such model.
+            UnknownEntityError: The model does not exist.
         """
         return self._instances[self.body(name).name]
 
     def restart(self) -> None:
-        """Empties the engine, adds the models to keep, and starts time at 0; robots must load themselves."""
-        self._let_go()
+        """Restarts the engine with the initial models and time 0; robots must be loaded again."""
+        self._release()
         self.settings, self.gravity = self._initial_physics
         self.engine.settings = self.settings
         self.engine.restart(self.gravity)
         self.forces.clear()
         self._bodies.clear()
-        self._names_by_number.clear()
+        self._names_by_body_id.clear()
         self._forces.clear()
         self._initial_poses.clear()
         self._instances.clear()
@@ -488,49 +488,49 @@ class PhysicsWorld:
         self.note_change()
 
     def save_state(self) -> WorldState:
-        """Returns the motion of everything, time and forces of requests, to continue from there once or more often.
+        """Returns the motion of all bodies, the time and the forces of requests, for `restore_state`.
 
-        Not part of it: controllers and their commands, and settings that requests changed.
+        The state does not include controllers, their commands, and settings changed by requests.
         """
-        self.rest.disturb()  # as `restore_state` does, so that both go on alike
+        self.rest.disturb()  # as in `restore_state`, so that both runs continue identically
         forces = self.forces.saved()
         return WorldState(
-            self.engine.save_state(), self._numbers(), tuple(self._welds), self._steps, self._time_ns, forces
+            self.engine.save_state(), self._body_ids(), tuple(self._welds), self._steps, self._time_ns, forces
         )
 
     def restore_state(self, state: WorldState) -> None:
-        """Continues from a saved state, bit for bit as before.
+        """Continues from a saved state, with bitwise identical results.
 
         Raises:
-            SimulationError: Models came, went or were made again since.
+            SimulationError: Models were spawned, deleted or replaced since.
         """
-        if state.numbers != self._numbers():
-            raise SimulationError("the models have changed since the state was saved; restore it before they do")
-        if state.welded != tuple(self._welds):
-            raise SimulationError("what the hands hold has changed since the state was saved; restore it before")
+        if state.body_ids != self._body_ids():
+            raise SimulationError("the models have changed since the state was saved, so it cannot be restored")
+        if state.welds != tuple(self._welds):
+            raise SimulationError("the held objects have changed since the state was saved, so it cannot be restored")
         self.engine.restore_state(state.engine)
-        self._steps = self._computed_until = state.steps
+        self._steps = self._last_computed_step = state.steps
         self._time_ns = state.time_ns
         self.forces.restore(state.forces)
         self.note_change()
 
     def forget_state(self, state: WorldState) -> None:
-        """Frees a saved state, which cannot be restored any more."""
+        """Deletes a saved state."""
         self.engine.forget_state(state.engine)
 
-    def _numbers(self) -> dict[str, tuple[int, ...]]:
+    def _body_ids(self) -> dict[str, tuple[int, ...]]:
         return {name: tuple(part.number for part in body.parts) for name, body in self._bodies.items()}
 
     def reset_time(self) -> None:
-        """Starts simulated time at 0 again."""
-        self._steps = self._time_ns = self._computed_until = 0
+        """Resets simulated time to 0."""
+        self._steps = self._time_ns = self._last_computed_step = 0
 
     def close(self) -> None:
         """Closes the physics engine; may be called twice."""
         self.engine.close()
 
     def _set_properties(self, body: SimulatedBody, model: specs.Model) -> None:
-        """Gives one tree of a model what its URDF does not say: surfaces, and how links and joints resist."""
+        """Sets properties of a tree that its URDF does not contain: surfaces, and resistance of links and joints."""
         engine = self.engine
         for link in model.links:
             index = body.link_indices.get(STATIC_LINK if model.static else link.name)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PyBullet, the default engine: one connection to it, set up the way this package needs it.
+"""PyBullet as the default physics engine.
 
-Everything here must be called from one thread: the engine keeps global state.
+All calls must come from one thread, because PyBullet has global state.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ import numpy.typing as npt
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.physics.contact_rules import let_smaller_coefficient_count
+from modular_framework_simulation.physics.contact_rules import use_smaller_coefficients
 from modular_framework_simulation.physics.cylinder_rims import with_rims
 from modular_framework_simulation.physics.physics_engine import (
     BASE_INDEX,
-    SHOWN_CHARACTERS,
+    MAX_SHOWN_CHARACTERS,
     EngineContact,
     EngineJoint,
     JointKind,
@@ -44,26 +44,26 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
 
 _RIGID_DAMPING = 1e9
-"""Damping of a contact [N s/m] that does not give way, with which only the share of correction is chosen."""
+"""Damping of a rigid contact [N s/m]; only the fraction of the correction matters."""
 
 _ITERATIONS_PER_RATIO, _MAX_ITERATIONS = 2.0, 2000
-"""Solver iterations per mass ratio of free bodies, and their bound: with 1:1,000 the light body sinks in by 1 %."""
+"""Solver iterations per mass ratio of free bodies, and their maximum; at 1:1,000 the penetration is about 1 %."""
 
 _MAX_VELOCITY = 1e3
-"""Bound on velocities of bodies [m/s, rad/s]; the engine's own, 100, stops fast tops."""
+"""Maximum velocity of bodies [m/s, rad/s]; the engine's default of 100 slows fast rotations down."""
 
 _WELD_FORCE = 1e5
-"""Most that a weld holds [N, and Nm]: anything."""
+"""Maximum force and torque of a weld [N, Nm], practically unlimited."""
 
 
 @contextlib.contextmanager
 def _silenced() -> Iterator[None]:
-    """Keeps the engine's C++ code from writing to the terminal; its problems come back as exceptions."""
+    """Discards terminal output of the engine's C++ code; its errors are raised as exceptions."""
     saved = [(os.dup(number), number) for number in (1, 2)]
     try:
-        with open(os.devnull, "w") as nothing:
+        with open(os.devnull, "w") as devnull:
             for _, number in saved:
-                os.dup2(nothing.fileno(), number)
+                os.dup2(devnull.fileno(), number)
             yield
     finally:
         for copy, number in saved:
@@ -72,20 +72,20 @@ def _silenced() -> Iterator[None]:
 
 
 def load_pybullet() -> Any:
-    """Returns the engine's module, without the build date that it prints when it is loaded."""
+    """Imports the engine's module without its terminal output."""
     with _silenced():
         import pybullet
     return pybullet
 
 
 class PyBulletEngine(PhysicsEngine):
-    """PyBullet with nothing in it.
+    """Empty PyBullet engine.
 
     Args:
-        settings: Numbers of the engine.
-        gravity: [m/s^2]
-        gui: Whether to open a window; without a display there is none, and a log line says so.
-        log: Takes a line of text about what was decided.
+        settings: Settings of the engine.
+        gravity: Gravity vector in the world frame [m/s^2].
+        gui: Whether to open a window; a missing display is logged.
+        log: Function that logs a decision.
     """
 
     name = "pybullet"
@@ -101,12 +101,12 @@ class PyBulletEngine(PhysicsEngine):
         if self.client < 0:
             self.client = self.api.connect(self.api.DIRECT)
         if self.client < 0:
-            raise SimulationError("the physics engine accepts no further connection; end another simulation first")
-        self._smaller_counts = let_smaller_coefficient_count(self.api)
-        if not self._smaller_counts:
+            raise SimulationError("the physics engine accepts no further connection; close another simulation first")
+        self._uses_smaller_coefficients = use_smaller_coefficients(self.api)
+        if not self._uses_smaller_coefficients:
             log(
-                "this build of the physics engine multiplies coefficients of friction and bounce: between two "
-                "different surfaces their geometric mean counts, not the smaller one"
+                "this build of the physics engine multiplies friction and restitution coefficients, so a contact "
+                "between different surfaces uses their geometric mean instead of the smaller coefficient"
             )
         self._rest = Rest(self.api, self.client, settings)
         self._impossible_moments: dict[int, dict[int, list[float]]] = {}  # by body and link
@@ -117,12 +117,12 @@ class PyBulletEngine(PhysicsEngine):
 
     def _open_window(self, log: Log) -> None:
         if not os.environ.get("DISPLAY"):
-            log("a window of the simulation was asked for, but there is no display: running headless")
+            log("the requested window is not available, because no display is set: running headless")
             return
         try:
             self.client = self.api.connect(self.api.GUI)
         except self.api.error as error:
-            log(f"no window of the simulation could be opened ({error}): running headless")
+            log(f"the requested window could not be opened ({error}): running headless")
         self.has_window = self.client >= 0
 
     def _set_parameters(self, gravity: Vector3) -> None:
@@ -142,11 +142,11 @@ class PyBulletEngine(PhysicsEngine):
         )
 
     def _solver_iterations(self) -> int:
-        """Returns how often the solver goes through the contacts: a light body under a heavy one needs their ratio."""
+        """Returns the number of solver iterations, which grows with the mass ratio of the free bodies."""
         masses = self._free_masses.values()
         ratio = max(masses) / min(masses) if masses else 1.0
-        least = self.settings.solver_iterations
-        return max(least, min(round(_ITERATIONS_PER_RATIO * ratio), _MAX_ITERATIONS))
+        minimum = self.settings.solver_iterations
+        return max(minimum, min(round(_ITERATIONS_PER_RATIO * ratio), _MAX_ITERATIONS))
 
     def _fit_iterations(self) -> None:
         self.api.setPhysicsEngineParameter(numSolverIterations=self._solver_iterations(), physicsClientId=self.client)
@@ -154,32 +154,32 @@ class PyBulletEngine(PhysicsEngine):
     def _configure(self, gravity: Vector3) -> None:
         self._set_parameters(gravity)
         if self.has_window:
-            # Side panels and shadows cost more than the physics where the graphics are drawn by software.
+            # Without a graphics card, side panels and shadows take longer than the physics.
             self.api.configureDebugVisualizer(self.api.COV_ENABLE_GUI, 0, physicsClientId=self.client)
             self.api.configureDebugVisualizer(self.api.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
             distance_m, yaw_deg, pitch_deg, target = 1.8, 50.0, -30.0, (0.0, 0.4, 0.9)
             self.api.resetDebugVisualizerCamera(distance_m, yaw_deg, pitch_deg, target, physicsClientId=self.client)
 
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
-        """Continues with other settings.
+        """Changes settings and gravity.
 
         Args:
-            settings: Numbers of the engine.
-            gravity: [m/s^2]
+            settings: Settings of the engine.
+            gravity: Gravity vector in the world frame [m/s^2].
         """
         self.settings = settings
         self._set_parameters(gravity)
         self._rest.adjust(settings)
 
     def engine_coefficient(self, coefficient: float) -> float:
-        """Returns what to give a surface of the engine for a coefficient of friction or restitution."""
-        return coefficient if self._smaller_counts else math.sqrt(coefficient)
+        """Converts a friction or restitution coefficient to the engine's value for a surface."""
+        return coefficient if self._uses_smaller_coefficients else math.sqrt(coefficient)
 
     def restart(self, gravity: Vector3) -> None:
-        """Takes everything out, contacts and their caches too.
+        """Removes all bodies, contacts and caches.
 
         Args:
-            gravity: [m/s^2]
+            gravity: Gravity vector in the world frame [m/s^2].
         """
         self.api.resetSimulation(physicsClientId=self.client)
         self._impossible_moments.clear()
@@ -190,10 +190,10 @@ class PyBulletEngine(PhysicsEngine):
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
         """Loads a body; see `PhysicsEngine`."""
         flags = self.api.URDF_USE_SELF_COLLISION if self_collision else 0
-        flags |= self.api.URDF_USE_IMPLICIT_CYLINDER  # else it has 32 sides, over which it rolls as a pencil does
+        flags |= self.api.URDF_USE_IMPLICIT_CYLINDER  # the default has 32 sides and rolls unevenly
         text = with_rims(text, name)
-        refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
-        # The engine remembers files by name, so each body needs a file of its own.
+        refuse_long_names(text, f"model '{name[:MAX_SHOWN_CHARACTERS]}'")
+        # The engine caches files by name, so each body needs its own file.
         self._files_written += 1
         file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
         file.write_text(text, encoding="utf-8")
@@ -202,13 +202,13 @@ class PyBulletEngine(PhysicsEngine):
                 body: int = self.api.loadURDF(
                     str(file),
                     useFixedBase=fixed,
-                    # With their faces known, boxes and hulls touch in up to four points at once, not in one.
+                    # SAT features allow boxes and hulls to have up to four contact points at once instead of one.
                     flags=flags | self.api.URDF_USE_INERTIA_FROM_FILE | self.api.URDF_INITIALIZE_SAT_FEATURES,
                     physicsClientId=self.client,
                 )
             file.unlink()
         except self.api.error as error:
-            problem = f"is refused by the physics engine ({error})"
+            problem = f"is rejected by the physics engine ({error})"
             raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
         self._set_dropped_moments(body, text)
         has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
@@ -220,7 +220,7 @@ class PyBulletEngine(PhysicsEngine):
         return body
 
     def _set_dropped_moments(self, body: int, text: str) -> None:
-        """Gives links their moments of inertia where the loader set them to 0: where no rigid body can have them."""
+        """Sets moments of inertia that the loader replaced by 0, because no rigid body has them."""
         names = [self.root_link(body), *(joint.child_link for joint in self.joints(body))]
         dropped = {}
         for index, name in enumerate(names, BASE_INDEX):
@@ -235,7 +235,7 @@ class PyBulletEngine(PhysicsEngine):
                 self._set_moments(body, number, moments)
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
-        """Returns the engine's record of every joint of a body, in the order of the link numbers."""
+        """Returns the engine's records of all joints of a body, sorted by index."""
         count = self.api.getNumJoints(body, physicsClientId=self.client)
         return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
 
@@ -245,7 +245,7 @@ class PyBulletEngine(PhysicsEngine):
         self._rest.after_step()
 
     def close(self) -> None:
-        """Ends the connection; may be called twice."""
+        """Closes the connection; may be called twice."""
         if self.client >= 0:
             with contextlib.suppress(self.api.error):
                 self.api.disconnect(physicsClientId=self.client)
@@ -253,18 +253,18 @@ class PyBulletEngine(PhysicsEngine):
             self._urdf_folder.cleanup()
 
     def resting(self) -> Collection[int]:
-        """Returns the bodies that have not moved for a while."""
+        """Returns the sleeping bodies."""
         return self._rest.known
 
     def save_state(self) -> int:
-        """Saves the state in the memory of the engine, contacts and their caches too.
+        """Saves the state, contacts and caches in the engine.
 
         Raises:
-            SimulationError: Bodies may be at rest.
+            SimulationError: The settings allow bodies to sleep.
         """
         if self.settings.rest_speed > 0.0:
             raise SimulationError(
-                "the state of a world whose bodies rest cannot be saved bit for bit; make it with rest_speed 0"
+                "a world with sleeping bodies cannot be saved with bitwise identical results; set rest_speed to 0"
             )
         state: int = self.api.saveState(physicsClientId=self.client)
         return state
@@ -274,11 +274,11 @@ class PyBulletEngine(PhysicsEngine):
         self.api.restoreState(state, physicsClientId=self.client)
 
     def forget_state(self, state: int) -> None:
-        """Frees a saved state."""
+        """Deletes a saved state."""
         self.api.removeState(state, physicsClientId=self.client)
 
     def remove_body(self, number: int) -> None:
-        """Takes a body out."""
+        """Removes a body."""
         self._rest.wake_touching(number)
         self._rest.remove(number)
         self._impossible_moments.pop(number, None)
@@ -292,7 +292,7 @@ class PyBulletEngine(PhysicsEngine):
         return name
 
     def joints(self, number: int) -> list[EngineJoint]:
-        """Returns every joint of a body."""
+        """Returns all joints of a body."""
         return [self._joint(info) for info in self.joint_infos(number)]
 
     def _joint(self, info: tuple[Any, ...]) -> EngineJoint:
@@ -303,21 +303,21 @@ class PyBulletEngine(PhysicsEngine):
             self.api.JOINT_FIXED: JointKind.FIXED,
         }
         lower, upper = info[8], info[9]
-        if lower > upper:  # the engine's way to say that there are none
+        if lower > upper:  # the engine's encoding of no limits
             lower, upper = -math.inf, math.inf
         kind = kinds.get(info[2], JointKind.OTHER)
         return EngineJoint(info[0], info[1].decode(), info[12].decode(), kind, lower, upper, info[6], info[7])
 
     def mass_properties(self, number: int, index: int) -> MassProperties:
-        """Returns the mass of a link and its distribution."""
+        """Returns the mass properties of a link."""
         record = self.api.getDynamicsInfo(number, index, physicsClientId=self.client)
         return MassProperties(record[0], record[2], Pose(tuple(record[3]), tuple(record[4])))
 
     def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
-        """Returns the joint space inertia."""
+        """Returns the joint space inertia matrix; see `PhysicsEngine`."""
         states = self.api.getJointStates(number, indices, physicsClientId=self.client)
         positions = [state[0] for state in states]
-        # The engine refuses moments here that no rigid body can have; their mean stands for them.
+        # The engine rejects moments that no rigid body has; their mean is used instead.
         impossible = self._impossible_moments.get(number, {})
         for index, moments in impossible.items():
             self._set_moments(number, index, [sum(moments) / 3.0] * 3)
@@ -330,7 +330,7 @@ class PyBulletEngine(PhysicsEngine):
         self.api.changeDynamics(number, index, localInertiaDiagonal=moments, physicsClientId=self.client)
 
     def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
-        """Sets which pairs of links touch."""
+        """Sets the pairs of links that collide."""
         every = range(BASE_INDEX, self.api.getNumJoints(number, physicsClientId=self.client))
         for a in every:
             for b in range(a + 1, every.stop):
@@ -339,13 +339,13 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
         """Sets friction, bounce and softness of a link."""
-        further: dict[str, float] = {}
+        options: dict[str, float] = {}
         softness = self._softness(surface)
         if softness is not None:
-            further["contactStiffness"], further["contactDamping"] = softness
+            options["contactStiffness"], options["contactDamping"] = softness
         if surface.restitution > 0.0:
-            # The engine slows a body down just before it touches: an impact would begin with another velocity.
-            further["contactProcessingThreshold"] = 0.0
+            # Otherwise, the engine slows a body down just before the contact, which changes the impact velocity.
+            options["contactProcessingThreshold"] = 0.0
         self.api.changeDynamics(
             number,
             index,
@@ -354,12 +354,12 @@ class PyBulletEngine(PhysicsEngine):
             rollingFriction=surface.rolling,
             restitution=self.engine_coefficient(surface.restitution),
             frictionAnchor=int(anchored),
-            **further,
+            **options,
             physicsClientId=self.client,
         )
 
     def _softness(self, surface: Surface) -> tuple[float, float] | None:
-        """Returns stiffness [N/m] and damping [N s/m] of a contact, or None for the engine's own."""
+        """Returns stiffness [N/m] and damping [N s/m] of a contact, or None for the engine's default."""
         settings, step_s = self.settings, self.settings.time_step_s
         if surface.restitution > 0.0:
             erp = settings.bounce_erp
@@ -367,11 +367,11 @@ class PyBulletEngine(PhysicsEngine):
         return softness_of(surface, settings)
 
     def remove_margin(self, number: int, index: int) -> None:
-        """Takes the margin away: with the engine's default, cylinders and meshes float a millimetre above a table."""
+        """Removes the collision margin, with which cylinders and meshes float a millimetre above a table."""
         self.api.changeDynamics(number, index, collisionMargin=0.0, physicsClientId=self.client)
 
     def remove_velocity_damping(self, number: int) -> None:
-        """Lets a body spin and fly freely: the engine brakes every body by 4 % of its velocity a second."""
+        """Removes the engine's default velocity damping of 4 % per second."""
         self.api.changeDynamics(
             number,
             BASE_INDEX,
@@ -382,36 +382,36 @@ class PyBulletEngine(PhysicsEngine):
         )
 
     def base_centre(self, number: int) -> Pose:
-        """Returns the pose of the root link's centre."""
+        """Returns the pose of the root link's centre of mass."""
         return Pose(*self.api.getBasePositionAndOrientation(number, physicsClientId=self.client))
 
     def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
-        """Returns the velocity of the root link's centre."""
+        """Returns linear and angular velocity of the root link's centre of mass."""
         linear, angular = self.api.getBaseVelocity(number, physicsClientId=self.client)
         return linear, angular
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
-        """Puts a body somewhere."""
+        """Sets the pose of the root link's centre of mass, with the root link at rest."""
         self._rest.wake_touching(number)
         self._rest.wake(number)
         self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
         self._rest.wake_near(number)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
-        """Sets the velocity of the root link's centre."""
+        """Sets the velocity of the root link's centre of mass."""
 
-        def give() -> None:
+        def set_velocity() -> None:
             self.api.resetBaseVelocity(number, linear, angular, physicsClientId=self.client)
 
-        self._rest.disturb(number, give)
+        self._rest.disturb(number, set_velocity)
 
     def link_motion(self, number: int, index: int) -> LinkMotion:
-        """Returns where a link is and how it moves."""
+        """Returns pose and velocity of a link."""
         record = self.api.getLinkState(number, index, 1, 1, physicsClientId=self.client)
         return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])
 
     def weld(self, number: int, index: int, other: int) -> int:
-        """Fastens a body to a link."""
+        """Welds a body to a link; see `PhysicsEngine`."""
         link = self.base_centre(number) if index == BASE_INDEX else self.link_motion(number, index).centre
         other_in_link = link.inverse() @ self.base_centre(other)
         weld: int = self.api.createConstraint(
@@ -430,24 +430,24 @@ class PyBulletEngine(PhysicsEngine):
         return weld
 
     def remove_weld(self, weld: int) -> None:
-        """Ends a weld."""
+        """Removes a weld."""
         self.api.removeConstraint(weld, physicsClientId=self.client)
 
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
-        """Lets a force act at a point of a link."""
+        """Applies a force [N] at a point of a link [m] in the next step."""
 
-        def push() -> None:
+        def apply() -> None:
             self.api.applyExternalForce(number, index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client)
 
-        self._rest.disturb(number, push)
+        self._rest.disturb(number, apply)
 
     def touches(self, number: int, index: int) -> list[Touch]:
-        """Returns where a link touches others."""
+        """Returns the contacts of a link with other bodies."""
         points = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
         return [Touch(point[2], point[9], point[8]) for point in points if point[2] != number]
 
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
-        """Returns where a link touches others."""
+        """Returns the contact points of a link, with forces."""
         records = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
         return [_contact(record) for record in records if record[9] > 0.0 or record[8] <= 0.0]
 
@@ -457,21 +457,21 @@ class PyBulletEngine(PhysicsEngine):
         return [JointState(record[0], record[1], record[3]) for record in records]
 
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
-        """Puts a joint somewhere."""
+        """Sets position and velocity of a joint."""
         self._rest.wake_touching(number)
         self.api.resetJointState(number, index, position, velocity, physicsClientId=self.client)
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
-        """Returns rotation and velocity of a ball joint."""
+        """Returns rotation and angular velocity of a ball joint."""
         turn, rate = self.api.getJointStateMultiDof(number, index, physicsClientId=self.client)[:2]
         return turn, rate
 
     def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
-        """Puts a ball joint somewhere."""
+        """Sets rotation and angular velocity of a ball joint."""
         self.api.resetJointStateMultiDof(number, index, turn, rate, physicsClientId=self.client)
 
     def release_ball_joint(self, number: int, index: int) -> None:
-        """Takes the engine's motor away from a ball joint."""
+        """Removes the engine's default motor of a ball joint."""
         self.api.setJointMotorControlMultiDof(
             number,
             index,
@@ -484,7 +484,7 @@ class PyBulletEngine(PhysicsEngine):
         )
 
     def set_joint_damping(self, number: int, index: int, damping: float) -> None:
-        """Sets the resistance of a joint per velocity."""
+        """Sets the viscous damping of a joint."""
         self.api.changeDynamics(number, index, jointDamping=damping, physicsClientId=self.client)
 
     def set_position_motors(
@@ -496,7 +496,7 @@ class PyBulletEngine(PhysicsEngine):
         efforts: Sequence[float],
         gain: float,
     ) -> None:
-        """Lets motors move joints to positions."""
+        """Sets motors that move joints to positions; see `PhysicsEngine`."""
         self.api.setJointMotorControlArray(
             number,
             indices,
@@ -510,7 +510,7 @@ class PyBulletEngine(PhysicsEngine):
         )
 
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
-        """Lets a motor bring a joint to a velocity."""
+        """Sets a motor that moves a joint at a velocity."""
         self.api.setJointMotorControl2(
             number,
             index,
@@ -522,27 +522,27 @@ class PyBulletEngine(PhysicsEngine):
         )
 
     def apply_effort(self, number: int, index: int, effort: float) -> None:
-        """Lets an effort act on a joint."""
+        """Applies an effort to a joint in the next step."""
         self.api.setJointMotorControl2(
             number, index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
         )
 
     def measure_joint_load(self, number: int, index: int) -> None:
-        """Lets the engine measure the load on a joint."""
+        """Enables the measurement of the load on a joint."""
         self._rest.keep_awake(number)
         self.api.enableJointForceTorqueSensor(number, index, True, physicsClientId=self.client)
 
     def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
-        """Returns what the link below a joint does to the one above.
+        """Returns the load of the child link on the parent link of a joint; see `PhysicsEngine`.
 
-        The engine gives what the parent does to the child, about the centre of mass of the child and in the axes of
-        its inertia, without what the motor does along the axis of the joint.
+        The engine measures the load of the parent link on the child link, at the centre of mass and in the inertia
+        frame of the child link, without the effort of the motor along the joint axis.
         """
         info = self.api.getJointInfo(number, index, physicsClientId=self.client)
         _, _, reaction, motor = self.api.getJointState(number, index, physicsClientId=self.client)
         record = self.api.getLinkState(number, index, physicsClientId=self.client)
         centre_in_link = Pose(record[2], record[3])
-        x, y, z = info[13]  # in the axes of the link's inertia
+        x, y, z = info[13]  # axis in the inertia frame of the link
         along_axis = (motor * x, motor * y, motor * z)
         force, torque = reaction[:3], reaction[3:]
         if info[2] == self.api.JOINT_REVOLUTE:
@@ -553,11 +553,11 @@ class PyBulletEngine(PhysicsEngine):
 
 
 def _contact(record: tuple[Any, ...]) -> EngineContact:
-    """Returns a record of the engine's contact points in our words."""
+    """Converts a record of the engine's contact points."""
     on_first, on_other, (nx, ny, nz) = record[5], record[6], record[7]
     px, py, pz = ((a + b) / 2 for a, b in zip(on_first, on_other, strict=True))
-    pushes = ((record[9], record[7]), (record[10], record[11]), (record[12], record[13]))
-    fx, fy, fz = (sum(size * direction[axis] for size, direction in pushes) for axis in range(3))
+    forces = ((record[9], record[7]), (record[10], record[11]), (record[12], record[13]))
+    fx, fy, fz = (sum(size * direction[axis] for size, direction in forces) for axis in range(3))
     return EngineContact(record[2], record[4], (px, py, pz), (nx, ny, nz), record[8], (fx, fy, fz))
 
 

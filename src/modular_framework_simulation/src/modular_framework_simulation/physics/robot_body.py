@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot in the physics engine: all its joints are read in one call and driven in one call a step.
+"""Robot in the physics engine; each step reads all joints in one call and commands all joints in one call.
 
-Joints with a transmission follow commands. Joints that mimic one of them stand for the mechanism of an underactuated
-gripper: a mimic joint beside its leader (the other finger) is coupled to it as by one servo that closes both, a mimic
-joint further down the chain (a distal phalanx) is drawn towards its free-motion angle with limited torque only, so
-that it gives way when an object presses against it.
+Joints with a transmission follow commands. Mimic joints represent the mechanism of an underactuated gripper. A mimic
+joint parallel to its leading joint (the other finger) is coupled to the leading joint as if one servo closed both. A
+mimic joint further down the chain (a distal phalanx) is drawn towards its free-motion angle with limited torque, so
+that it yields when an object presses against it.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from modular_framework_simulation.physics.simulated_body import SimulatedBody
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 _POSITION_GAIN = 0.2
-"""Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""
+"""Fraction of a position error that a drive corrects in one physics step; velocities are fully fed forward."""
 
 _COUPLING_FACTOR = 2.0
-"""How much stronger the coupling of a second finger is than the drive of the first, so that the object is centred."""
+"""Ratio of the coupling effort of a second finger to the drive effort of the first, which centres the object."""
 
 
-_ALIKE = 0.5
-"""Cosine between the axes of two chains of links above which they move the same way; of fingers around a palm, the
-nearest have an angle of at least 90 degrees between them."""
+_MIN_AXIS_COSINE = 0.5
+"""Minimum cosine between the joint axes of two link chains that belong to one finger; the closest fingers around a palm
+have an angle of at least 90 degrees."""
 
 
 class Role(Enum):
@@ -56,13 +56,13 @@ class Mode(IntEnum):
 
 @dataclass(slots=True)
 class Drive:
-    """The command of one driven joint.
+    """Command of a driven joint.
 
     Attributes:
-        mode: What `command` is.
+        mode: Control mode of the command.
         command: Position [rad or m], velocity [rad/s or m/s] or effort [Nm or N].
-        feed_forward: Velocity of the moving position command [rad/s or m/s].
-        effort_limit: Largest effort [Nm or N].
+        feed_forward: Velocity of a moving position command [rad/s or m/s].
+        effort_limit: Maximum effort [Nm or N].
     """
 
     mode: Mode
@@ -76,9 +76,9 @@ class Gripper:
     """One of the robot's grippers.
 
     Attributes:
-        palm_link: Link the fingers are fastened to.
-        links: Palm and everything below it: the links that may touch a held object.
-        fingers: For each finger the engine's numbers of its links. The bars of a linkage are one finger.
+        palm_link: Link that carries the fingers.
+        links: Palm and all links below, which may touch a held object.
+        fingers: Engine link indices of each finger; the links of a linkage form one finger.
     """
 
     palm_link: str
@@ -86,36 +86,36 @@ class Gripper:
     fingers: tuple[tuple[int, ...], ...]
 
 
-class _Follows(NamedTuple):
-    """Motion of a mimic joint: `multiplier` times its leader's position plus `offset`.
+class _MimicMotion(NamedTuple):
+    """Motion of a mimic joint: `multiplier` times the leading joint's position plus `offset`.
 
     Attributes:
-        leader: Rank of the leader among the joints.
-        effort: Largest effort of the coupling [Nm or N].
-        fastest: Velocity limit [rad/s or m/s]; never below the velocity that belongs to the leader's limit.
+        leader: Index of the leading joint.
+        effort: Maximum effort of the coupling [Nm or N].
+        max_velocity: Maximum velocity [rad/s or m/s], at least the velocity at the leading joint's velocity limit.
     """
 
     leader: int
     multiplier: float
     offset: float
     effort: float
-    fastest: float
+    max_velocity: float
 
 
 class RobotBody:
-    """A robot that stands in the world.
+    """Robot in the world, with a fixed base.
 
     Args:
-        world: Where to put it.
-        description: What it is made of.
-        name: Instance name in the world.
-        pose: Of its root link in the world frame.
-        positions: Starting joint positions [rad or m]; joints that are not named start at 0 or at the nearest limit,
-            mimic joints where their leader puts them.
+        world: The world.
+        description: Description of the robot.
+        name: Name of the robot in the world.
+        pose: Pose of the root link in the world frame.
+        positions: Initial joint positions [rad or m]. Other joints start at 0 or the nearest limit, and mimic joints
+            start at the position given by the leading joint.
 
     Raises:
-        DuplicateModelError: The name is taken.
-        DescriptionError: The engine refuses the robot, or a joint in `positions` does not exist.
+        DuplicateModelError: The name is already in use.
+        DescriptionError: The engine rejects the robot, or a joint in `positions` does not exist.
     """
 
     def __init__(
@@ -134,10 +134,10 @@ class RobotBody:
         self.joint_names = [joint.name for joint in description.joints if joint.name in self.body.joint_indices]
         self._joints = [joint for joint in description.joints if joint.name in self.body.joint_indices]
         self._indices = [self.body.joint_indices[name] for name in self.joint_names]
-        self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
+        self._index_by_name = {joint_name: index for index, joint_name in enumerate(self.joint_names)}
         self.readings = [JointState(0.0, 0.0, 0.0)] * len(self._indices)
         self._commands: list[tuple[Mode, float, float, float]] = []
-        self._follows = [self._how_it_follows(joint) for joint in self._joints]
+        self._mimic_motions = [self._mimic_motion(joint) for joint in self._joints]
         self.grippers = self._grippers()
         self.starting_positions = self._complete(positions)
         self._set_up()
@@ -158,25 +158,25 @@ class RobotBody:
         set_joint_resistance(self.world.engine, self.body, self._dynamics)
 
     def reload(self) -> None:
-        """Puts the robot into the world again, which has been emptied; joints are at their starting positions."""
+        """Loads the robot again after a restart of the world, with its joints at the initial positions."""
         self._load()
         self._set_up()
 
     @property
     def fingers(self) -> list[tuple[int, ...]]:
-        """The engine's link numbers of each finger of every gripper."""
+        """Returns the engine link indices of each finger of all grippers."""
         return [finger for gripper in self.grippers for finger in gripper.fingers]
 
-    def _how_it_follows(self, joint: RobotJoint) -> _Follows | None:
-        if joint.mimic is None or joint.mimic.leader not in self._rank:
+    def _mimic_motion(self, joint: RobotJoint) -> _MimicMotion | None:
+        if joint.mimic is None or joint.mimic.leader not in self._index_by_name:
             return None
-        mimic, rank = joint.mimic, self._rank[joint.mimic.leader]
+        mimic, index = joint.mimic, self._index_by_name[joint.mimic.leader]
         effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
-        fastest = max(joint.velocity, abs(mimic.multiplier) * self._joints[rank].velocity)
-        return _Follows(rank, mimic.multiplier, mimic.offset, effort, fastest)
+        max_velocity = max(joint.velocity, abs(mimic.multiplier) * self._joints[index].velocity)
+        return _MimicMotion(index, mimic.multiplier, mimic.offset, effort, max_velocity)
 
     def _grippers(self) -> tuple[Gripper, ...]:
-        """Sorts the joints of grippers by the link below which their leaders' fingers begin."""
+        """Groups the joints of grippers by the palm link of their leading joint."""
         joints = gripper_joints(self._joints)
         by_name = {joint.name: joint for joint in joints}
         palms: dict[str, dict[str, RobotJoint]] = {}
@@ -189,7 +189,7 @@ class RobotBody:
         )
 
     def _chain_root(self, joint: RobotJoint, gripper: list[RobotJoint]) -> RobotJoint:
-        """Returns the first joint of the chain that a gripper joint belongs to, also above links that are fixed."""
+        """Returns the first gripper joint of a chain; fixed links within the chain are allowed."""
         by_child = {each.child_link: each for each in gripper}
         link = joint.parent_link
         while link:
@@ -198,16 +198,19 @@ class RobotBody:
         return joint
 
     def _fingers(self, roots: list[RobotJoint]) -> tuple[tuple[int, ...], ...]:
-        """Returns the links of each finger, from the first joints of the chains that hang on the palm.
+        """Returns the link indices of each finger.
 
-        Chains whose first joints move the same way are one linkage (outer and inner knuckle of a four-bar finger):
-        fingers close from different sides.
+        Chains whose first joints move in the same direction form one linkage, such as the outer and inner knuckle of a
+        four-bar finger, because different fingers close from different sides.
+
+        Args:
+            roots: First joints of the chains at the palm.
         """
         fingers: list[tuple[Vector3, list[int]]] = []
         for root in roots:
             links = [self.body.link_indices[link] for link in self._links_below(root.child_link)]
             direction = self._closing_axis(root)
-            finger = next((links for axis, links in fingers if _dot(axis, direction) > _ALIKE), None)
+            finger = next((links for axis, links in fingers if _dot(axis, direction) > _MIN_AXIS_COSINE), None)
             if finger is None:
                 fingers.append((direction, links))
             else:
@@ -215,14 +218,14 @@ class RobotBody:
         return tuple(tuple(links) for _, links in fingers)
 
     def _closing_axis(self, joint: RobotJoint) -> Vector3:
-        """Returns the axis of a joint, in the world frame, about or along which it moves while its leader goes up."""
+        """Returns the axis of a joint in the world frame, directed for an increasing leading joint position."""
         frame = self.world.engine.link_motion(self.body.number, self.body.joint_indices[joint.name]).frame
         x, y, z = rotate_vector(frame.quaternion, joint.axis)
         length = math.copysign(math.hypot(x, y, z), joint.mimic.multiplier if joint.mimic is not None else 1.0)
         return (x / length, y / length, z / length)
 
     def _links_below(self, top: str) -> tuple[str, ...]:
-        """Returns a link and all links that hang on it."""
+        """Returns a link and all links below."""
         parents = self.description.parents
 
         def below(link: str) -> bool:
@@ -235,22 +238,22 @@ class RobotBody:
         return tuple(link for link in self.description.links if below(link))
 
     def reset(self) -> None:
-        """Puts the joints at their starting positions, at rest."""
+        """Sets the joints to their initial positions, at rest."""
         self.body.reset_joints(self.starting_positions)
         self.read()
 
     def read(self) -> list[JointState]:
-        """Measures all joints; the result is in the order of `joint_names`."""
-        if not self._indices:  # the engine answers for no joints with nothing at all
+        """Measures all joints, in the order of `joint_names`."""
+        if not self._indices:  # the engine returns None for an empty list of joints
             return self.readings
         self.readings = self.world.engine.joint_states(self.body.number, self._indices)
         return self.readings
 
     def drive(self, drives: dict[str, Drive]) -> None:
-        """Sets the motors of all joints for the coming physics steps.
+        """Sets the motors of all joints for the next physics steps.
 
         Args:
-            drives: Commands of the driven joints by name; joints that are not named are free.
+            drives: Commands of the driven joints, by name; other joints are free.
         """
         if not self._indices:
             return
@@ -260,26 +263,26 @@ class RobotBody:
             self._commands = commands
         elif self.world.at_rest:
             return
-        reach_s = self.world.settings.time_step_s / _POSITION_GAIN
+        correction_time_s = self.world.settings.time_step_s / _POSITION_GAIN
         targets: list[float] = []
         velocities: list[float] = []
         efforts: list[float] = []
-        for joint, reading, follows in zip(self._joints, self.readings, self._follows, strict=True):
-            position, drive, fastest = reading.position, drives.get(joint.name), joint.velocity
+        for joint, reading, mimic in zip(self._joints, self.readings, self._mimic_motions, strict=True):
+            position, drive, max_velocity = reading.position, drives.get(joint.name), joint.velocity
             if drive is not None and drive.mode is Mode.POSITION:
                 target, velocity, effort = drive.command, drive.feed_forward, drive.effort_limit
             elif drive is not None and drive.mode is Mode.VELOCITY:
                 target, velocity, effort = position, drive.command, drive.effort_limit
-            elif follows is not None:
-                leader = self.readings[follows.leader]
-                target = follows.multiplier * leader.position + follows.offset
-                velocity, effort, fastest = follows.multiplier * leader.velocity, follows.effort, follows.fastest
-            else:  # a joint that nothing drives is held by its friction alone
+            elif mimic is not None:
+                leader = self.readings[mimic.leader]
+                target = mimic.multiplier * leader.position + mimic.offset
+                velocity, effort, max_velocity = mimic.multiplier * leader.velocity, mimic.effort, mimic.max_velocity
+            else:  # only friction holds an undriven joint
                 target, velocity, effort = position, 0.0, self._dynamics[joint.name].friction
-            # The drive adds the velocity that corrects the position to the one fed forward; the sum stays in bounds.
-            ahead = position + max(0.0, fastest - velocity) * reach_s
-            behind = position - max(0.0, fastest + velocity) * reach_s
-            targets.append(max(behind, min(ahead, target)))
+            # The drive adds a correction velocity to the fed-forward velocity; the sum must not exceed the limit.
+            max_target = position + max(0.0, max_velocity - velocity) * correction_time_s
+            min_target = position - max(0.0, max_velocity + velocity) * correction_time_s
+            targets.append(max(min_target, min(max_target, target)))
             velocities.append(velocity)
             efforts.append(effort)
         engine = self.world.engine
@@ -294,7 +297,7 @@ class RobotBody:
                 engine.apply_effort(self.body.number, self.body.joint_indices[name], effort)
 
     def _complete(self, positions: dict[str, float]) -> dict[str, float]:
-        unknown = sorted(set(positions) - set(self._rank))
+        unknown = sorted(set(positions) - set(self._index_by_name))
         if unknown:
             known = ", ".join(self.joint_names)
             raise DescriptionError("starting pose", f"names unknown joints {unknown}", f"allowed: {known}")
@@ -303,14 +306,14 @@ class RobotBody:
         }
         for joint in self._joints:
             if joint.mimic is not None and joint.name not in positions and joint.mimic.leader in complete:
-                followed = joint.mimic.multiplier * complete[joint.mimic.leader] + joint.mimic.offset
-                complete[joint.name] = max(joint.lower, min(joint.upper, followed))
+                mimic_position = joint.mimic.multiplier * complete[joint.mimic.leader] + joint.mimic.offset
+                complete[joint.name] = max(joint.lower, min(joint.upper, mimic_position))
         return complete
 
     def _limit_self_collisions(self) -> None:
-        """Leaves collisions between fingers only: the planner checks the rest of the robot.
+        """Enables self-collisions between fingers only, because the planner checks the rest of the robot.
 
-        Links of one finger never collide: the bars of a linkage overlap at its hinges.
+        Links of the same finger never collide, because the bars of a linkage overlap at the hinges.
         """
         fingers = self.fingers
         allowed = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model as it is in the physics engine: converts between the engine's centre-of-mass frames and link frames."""
+"""Model in the physics engine, with conversions between the engine's centre-of-mass frames and link frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """Velocities in the world frame: linear [m/s] of the frame's origin, and angular [rad/s]."""
+    """Linear velocity of a frame's origin [m/s] and angular velocity [rad/s], in the world frame."""
 
     linear: Vector3 = (0.0, 0.0, 0.0)
     angular: Vector3 = (0.0, 0.0, 0.0)
@@ -23,7 +23,7 @@ class Twist:
 
 @dataclass(frozen=True, slots=True)
 class BodyState:
-    """Pose and velocity of a model or link."""
+    """Pose and twist of a model or link."""
 
     pose: Pose
     twist: Twist
@@ -31,12 +31,12 @@ class BodyState:
 
 @dataclass(frozen=True, slots=True)
 class JointSettings:
-    """Settings of a joint that a request changed; None where its description decides.
+    """Settings of a joint that a request has changed; None for the value of the description.
 
     Attributes:
-        damping: Resistance per velocity [Nm s/rad or N s/m].
-        motor_velocity: What a motor in the joint wants [rad/s or m/s].
-        motor_effort: What it has for that [Nm or N]; 0: there is no motor.
+        damping: Viscous damping [Nm s/rad or N s/m].
+        motor_velocity: Target velocity of the joint motor [rad/s or m/s].
+        motor_effort: Maximum effort of the joint motor [Nm or N]; 0 for no motor.
     """
 
     damping: float | None = None
@@ -58,15 +58,15 @@ class SimulatedBody:
     """One model in the engine.
 
     Args:
-        engine: Where it lives.
-        number: The engine's number of the body.
-        name: Instance name.
-        tree: How the engine has its links; None for a robot.
-        static: Whether it never moves.
-        spec: The model's description; None for a robot.
+        engine: The physics engine.
+        number: Body id in the engine.
+        name: Name of the model in the world.
+        tree: Frames of the links in the engine; None for a robot.
+        static: Whether the model never moves.
+        spec: Description of the model; None for a robot.
 
     Attributes:
-        further: The other trees of a model whose joints do not connect all its links.
+        further: Other trees of a model whose joints do not connect all links.
     """
 
     def __init__(
@@ -99,41 +99,41 @@ class SimulatedBody:
 
     @property
     def parts(self) -> tuple[SimulatedBody, ...]:
-        """All trees of the model, this one first."""
+        """Returns all trees of the model, starting with this tree."""
         return (self, *self.further)
 
     def part_of(self, link: str) -> SimulatedBody:
-        """Returns the tree that a link of the model belongs to; this one where there is no such link."""
+        """Returns the tree that contains a link of the model; this tree for an unknown link."""
         return next((part for part in self.parts if link in part.link_indices), self)
 
-    def link_of_number(self, number: int, link: int) -> str:
-        """Returns the name of a link by the engine's numbers of one of the trees and of the link; "" for none."""
+    def link_name_of(self, number: int, link: int) -> str:
+        """Returns the name of a link by body id and link index; "" if unknown."""
         part = next((each for each in self.parts if each.number == number), self)
         return next((name for name, index in part.link_indices.items() if index == link), "")
 
     def link_names(self) -> list[str]:
-        """Returns the names of the links as its description has them."""
+        """Returns the names of the links in the description."""
         if self.spec is not None:
             return [link.name for link in self.spec.links]
         return list(self.link_indices)
 
     def joint_names(self) -> list[str]:
-        """Returns the names of the joints as its description has them; of a robot those that move."""
+        """Returns the names of the joints in the description; for a robot, only the movable joints."""
         if self.spec is not None:
             return [joint.name for joint in self.spec.joints]
         return list(self.joint_indices)
 
     def state(self) -> BodyState:
-        """Returns pose and velocity of the model frame in the world."""
+        """Returns pose and twist of the model frame in the world frame."""
         centre_in_world, twist = self._centre_state()
         model_in_world = centre_in_world @ self._root_in_centre @ self._model_in_root
         return BodyState(model_in_world, twist_at(twist, centre_in_world, model_in_world))
 
     def link_state(self, link: str) -> BodyState:
-        """Returns pose and velocity of a link frame in the world.
+        """Returns pose and twist of a link frame in the world frame.
 
         Raises:
-            UnknownEntityError: The model has no such link.
+            UnknownEntityError: The model does not have the link.
         """
         if self.static and self.spec is not None:
             for each in self.spec.links:
@@ -153,10 +153,10 @@ class SimulatedBody:
         return BodyState(link_in_world, twist_at(Twist(motion.linear, motion.angular), motion.centre, link_in_world))
 
     def set_state(self, state: BodyState) -> None:
-        """Puts the model somewhere as one rigid body; its joints keep their positions.
+        """Moves the model as one rigid body; its joints keep their positions.
 
         Args:
-            state: Of the model frame, in the world frame.
+            state: State of the model frame in the world frame.
         """
         model_in_world = self.state().pose if self.further else Pose()
         for part in self.further:
@@ -169,25 +169,25 @@ class SimulatedBody:
             self._engine.set_base_twist(self.number, twist.linear, twist.angular)
 
     def release_ball_joints(self) -> None:
-        """Lets ball joints turn freely: the engine would otherwise brake them with a motor of its own."""
+        """Removes the engine's default motors of ball joints, which would brake the joints."""
         for index in self.ball_joint_indices:
             self._engine.release_ball_joint(self.number, index)
 
-    def put_together(self, pose: Pose) -> None:
-        """Puts the model somewhere at rest, with its trees where its description has them.
+    def place_at_rest(self, pose: Pose) -> None:
+        """Places the model at rest, with its trees at the relative poses of the description.
 
         Args:
-            pose: Of the model frame, in the world frame.
+            pose: Pose of the model frame in the world frame.
         """
         for part in self.further:
             part.set_state(BodyState(self.state().pose, Twist()))
         self.set_state(BodyState(pose, Twist()))
 
     def set_joints(self, positions: dict[str, float]) -> None:
-        """Puts joints at positions [rad or m], at rest; joints that are not named stay.
+        """Sets joint positions [rad or m], at rest; other joints keep their positions.
 
         Raises:
-            UnknownEntityError: The model has no such movable joint.
+            UnknownEntityError: The model does not have a movable joint of this name.
         """
         owners = {name: part for part in self.parts for name in part.joint_indices}
         unknown = sorted(set(positions) - set(owners))
@@ -198,25 +198,31 @@ class SimulatedBody:
             self._engine.set_joint_state(owners[name].number, index, position, 0.0)
 
     def reset_joints(self, positions: dict[str, float]) -> None:
-        """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
+        """Sets joint positions [rad or m], at rest; other joints are set to 0."""
         self.set_joints({name: positions.get(name, 0.0) for part in self.parts for name in part.joint_indices})
         for part in self.parts:
             for index in part.ball_joint_indices:
                 self._engine.set_ball_joint_state(part.number, index, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
     def _centre_state(self) -> tuple[Pose, Twist]:
-        """Returns pose and velocity of the root link's centre of mass, in the world frame."""
+        """Returns pose and twist of the root link's centre of mass in the world frame."""
         centre = self._engine.base_centre(self.number)
         return centre, Twist() if self.static else Twist(*self._engine.base_twist(self.number))
 
 
 def twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:
-    """Returns the twist of a rigid body at another of its points."""
+    """Returns the twist of a rigid body at another point of the body.
+
+    Args:
+        twist: Twist at the first point.
+        from_in_world: Frame at the first point.
+        to_in_world: Frame at the second point.
+    """
     x, y, z = (b - a for a, b in zip(from_in_world.position, to_in_world.position, strict=True))
     return Twist(add(twist.linear, cross(twist.angular, (x, y, z))), twist.angular)
 
 
 def twist_in_frame(twist: Twist, frame_in_world: Pose) -> Twist:
-    """Returns a twist given in the axes of the world in the axes of a frame."""
+    """Rotates a twist from the world frame into another frame."""
     world_to_frame = frame_in_world.inverse().quaternion
     return Twist(rotate_vector(world_to_frame, twist.linear), rotate_vector(world_to_frame, twist.angular))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulated robot behind the interface that every robot has: `RobotHW`.
+"""`RobotHW` of the simulated robot.
 
-Which interfaces a joint offers is read from the transmissions of the robot description, as ros_control prescribes.
+The transmissions of the robot description define the hardware interfaces of each joint, as in ros_control.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _MODES = {interface.type_name: mode for mode, interface in _INTERFACES.items()}
 class SimulatedRobotHW(RobotHW):
     """Joint states and commands of a robot in the simulated world.
 
-    A joint obeys the interface its running controller claimed; before any controller did, it holds its position.
+    A joint follows the interface that its running controller claims; before the first claim, it holds its position.
 
     Args:
         robot: The robot in the physics engine.
@@ -54,20 +54,20 @@ class SimulatedRobotHW(RobotHW):
         self._robot = robot
         self._states: list[JointStateHandle] = []
         self._handles: dict[str, dict[Mode, JointHandle]] = {}
-        self._saturations: dict[str, dict[Mode, JointLimiter]] = {}
+        self._limiters: dict[str, dict[Mode, JointLimiter]] = {}
         self._drives: dict[str, Drive] = {}
         self._efforts: dict[str, float] = {}
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
-        """Registers a state handle for every movable joint and command handles as the transmissions say.
+        """Registers a state handle for every movable joint, and the command handles of the transmissions.
 
         Args:
-            root_nh: Read for `joint_limits/<joint>/...` and the soft limits of `robot_description`.
-            robot_hw_nh: Not read.
+            root_nh: Node handle for `joint_limits/<joint>/...` and `robot_description` with its soft limits.
+            robot_hw_nh: Not used.
 
         Raises:
-            HardwareInterfaceError: A transmission names an interface that does not exist.
-            ParameterError: A joint limit parameter has a wrong type.
+            HardwareInterfaceError: A transmission names an unknown hardware interface.
+            ParameterError: A parameter of the joint limits has the wrong type.
         """
         del robot_hw_nh
         states = JointStateInterface()
@@ -97,22 +97,22 @@ class SimulatedRobotHW(RobotHW):
         self._handles.setdefault(handle.name, {})[mode] = handle
         self._efforts[handle.name] = limits.max_effort
         limiter = limit_handle(_INTERFACES[mode], handle, limits, soft)
-        self._saturations.setdefault(handle.name, {})[mode] = limiter
+        self._limiters.setdefault(handle.name, {})[mode] = limiter
 
     def hold(self) -> None:
-        """Makes the present positions the commands; to be called after the joints were reset."""
+        """Sets the commands to the current positions; must be called after a reset of the joints."""
         for name, handles in self._handles.items():
             position = next(iter(handles.values())).position
             for mode, handle in handles.items():
                 handle.command = position if mode is Mode.POSITION else 0.0
-                self._saturations[name][mode].reset()
-            first = self._drives[name].mode if name in self._drives else next(iter(handles))
-            self._drives[name] = Drive(first, handles[first].command, 0.0, self._efforts[name])
-            if first is Mode.POSITION:
+                self._limiters[name][mode].reset()
+            active_mode = self._drives[name].mode if name in self._drives else next(iter(handles))
+            self._drives[name] = Drive(active_mode, handles[active_mode].command, 0.0, self._efforts[name])
+            if active_mode is Mode.POSITION:
                 self._drives[name].command = position
 
     def read(self, time_s: float, period_s: float) -> None:
-        """Fills the joint states with what the physics engine has."""
+        """Updates the joint states from the physics engine."""
         del time_s, period_s
         for state, reading in zip(self._states, self._robot.read(), strict=True):
             state.position = reading.position
@@ -120,11 +120,11 @@ class SimulatedRobotHW(RobotHW):
             state.effort = reading.effort
 
     def write(self, time_s: float, period_s: float) -> None:
-        """Saturates the commands and passes them to the motors for the next physics steps."""
+        """Applies limits to the commands, and passes the commands to the motors for the next physics steps."""
         del time_s
         for name, drive in self._drives.items():
             handle = self._handles[name][drive.mode]
-            self._saturations[name][drive.mode].enforce_limits(period_s)
+            self._limiters[name][drive.mode].enforce_limits(period_s)
             if drive.mode is Mode.POSITION and period_s > 0:
                 drive.feed_forward = _feed_forward(handle, (handle.command - drive.command) / period_s)
             drive.command = handle.command
@@ -133,17 +133,17 @@ class SimulatedRobotHW(RobotHW):
         self._robot.drive(self._drives)
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        """Switches each joint to the interface through which a starting controller claims it."""
+        """Switches each joint to the interface that a starting controller claims."""
         del stop
         for mode, joints in _claims(start):
             for name in joints:
                 handle = self._handles[name][mode]
                 handle.command = handle.position if mode is Mode.POSITION else 0.0
                 if mode is Mode.POSITION and self._drives[name].mode is Mode.POSITION:
-                    # The drive keeps its set point: a loaded joint sags a little below it.
+                    # The drive keeps its set point, because a loaded joint sags slightly below it.
                     handle.command = self._drives[name].command
                 else:
-                    self._saturations[name][mode].reset()
+                    self._limiters[name][mode].reset()
                 self._drives[name] = Drive(mode, handle.command, 0.0, self._efforts[name])
 
 
@@ -155,9 +155,9 @@ def _claims(controllers: Iterable[ControllerInfo]) -> Iterable[tuple[Mode, tuple
 
 
 def _feed_forward(handle: JointHandle, velocity: float) -> float:
-    """Returns `velocity` unless the joint cannot have it: a command that is put back to the joint is no motion."""
-    fastest = handle.limits.max_velocity if handle.limits is not None else float("inf")
-    return velocity if abs(velocity) <= _ROUNDING * fastest else 0.0
+    """Returns `velocity`, or 0 above the joint's limit, because a command that is reset to the joint is no motion."""
+    max_velocity = handle.limits.max_velocity if handle.limits is not None else float("inf")
+    return velocity if abs(velocity) <= _ROUNDING * max_velocity else 0.0
 
 
 def _limits(joint: RobotJoint) -> JointLimits:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says which friction, bounce and softness a link of a model has.
+"""Determines friction, bounce and softness of a link.
 
-Engines have one surface a link: where the shapes of a link differ, the most slippery and the least bouncy decides.
+Engines have one surface per link. If the shapes of a link differ, the lowest friction and the lowest restitution are
+used.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from modular_framework_simulation.physics.physics_engine import Surface
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 
 _GAZEBO_KP, _GAZEBO_KD = 1e12, 1.0
-"""Gazebo's stiffness and damping of contacts where a model does not say [N/m, N s/m]: as good as rigid."""
+"""Gazebo's default stiffness and damping of contacts [N/m, N s/m], which are practically rigid."""
 
 
 def surface_of(collisions: Sequence[specs.Collision], settings: PhysicsSettings) -> Surface:
-    """Returns the one surface that stands for all shapes of a link."""
+    """Returns the surface that represents all shapes of a link."""
     frictions = [each.friction for each in collisions]
     contacts = [each.contact for each in collisions]
     return Surface(
@@ -35,10 +36,10 @@ def surface_of(collisions: Sequence[specs.Collision], settings: PhysicsSettings)
 
 
 def softness_of(surface: Surface, settings: PhysicsSettings) -> tuple[float, float] | None:
-    """Returns stiffness [N/m] and damping [N s/m] of a contact, or None if it is rigid.
+    """Returns stiffness [N/m] and damping [N s/m] of a contact, or None for a rigid contact.
 
-    Of a penetration the share k h / (k h + d) is corrected in a step h, and it gives way by 1 / (k h + d). The damping
-    is raised where more than `hardest_erp` would be corrected; the penetration at rest, weight / k, stays the same.
+    A step h corrects the fraction k h / (k h + d) of a penetration, with the compliance 1 / (k h + d). The damping is
+    raised if more than `hardest_erp` would be corrected; the penetration at rest, weight / k, does not change.
     """
     kp = _GAZEBO_KP if surface.kp is None else surface.kp
     kd = _GAZEBO_KD if surface.kd is None else surface.kd

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulated sensors: what they measure, without ROS."""
+"""Simulated sensors and their measurements, independent of ROS."""

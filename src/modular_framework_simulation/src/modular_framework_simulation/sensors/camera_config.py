@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the cameras of a `sensors_config.yaml` that has been loaded into parameters.
+"""Reads the cameras of a `sensors_config.yaml` from parameters.
 
-A section is a camera when it has `data_topics`, or when the topics at the top level of the file are in a namespace
-called like its `frame_id`. That frame is the optical frame.
+A section is a camera if it has `data_topics`, or if the topics at the top level of the file are in a namespace with the
+name of its `frame_id`. The frame `frame_id` is the optical frame.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from modular_framework_simulation.sensors.cameras import Camera, CameraTopics, P
 from modular_framework_simulation.sensors.noise import Noise
 
 FrameLocator = Callable[[str], str | None]
-"""Returns the entity of the world, "world" or "model::link", that a frame belongs to; None for an unknown frame."""
+"""Function that returns the entity of a frame, "world" or "model::link"; None for an unknown frame."""
 
 DEFAULT_RATE_HZ = 10.0
 
@@ -31,7 +31,7 @@ _CAMERA_KEYS = ("width", "height", "horizontal_fov", "near", "far", "rate", "noi
 
 
 class _Fault(ValueError):
-    """A value of one section cannot be used."""
+    """A value of a section is invalid."""
 
 
 def read_cameras(
@@ -40,13 +40,13 @@ def read_cameras(
     """Reads the cameras.
 
     Args:
-        settings: The contents of the file.
-        where: Where they are, for the messages.
-        locate: Finds the origins of frames in the world.
-        seed: Of the simulation, for noise.
+        settings: Contents of the file.
+        where: Location of the settings for messages.
+        locate: Function that finds the entity of a frame.
+        seed: Random seed of the simulation, for noise.
 
     Returns:
-        The usable cameras, and one sentence for each that is not usable.
+        The valid cameras, and one sentence per invalid camera.
     """
     cameras, faults = [], []
     for name, section in settings.items():
@@ -65,7 +65,7 @@ def _camera(name: str, section: Mapping[str, Any], topics: CameraTopics, locate:
     origin, pose = _placement(section)
     parent = locate(origin)
     if parent is None:
-        raise _Fault(f"origin_frame_id: got '{origin}'; allowed: world, or a link of the robot in the simulation")
+        raise _Fault(f"origin_frame_id: got '{origin}'; allowed: world, or a link of the simulated robot")
     given = _mapping(section, "camera")
     unknown = sorted(set(given) - set(_CAMERA_KEYS))
     if unknown:
@@ -93,16 +93,16 @@ def _topics(settings: Mapping[str, Any], section: Mapping[str, Any]) -> CameraTo
     if not any(names.values()):
         return None
     rgb, depth = names.get("rgb", ""), names.get("depth", "")
-    return CameraTopics(rgb, _info_beside(rgb), depth, _info_beside(depth), names.get("points", ""))
+    return CameraTopics(rgb, _info_topic(rgb), depth, _info_topic(depth), names.get("points", ""))
 
 
-def _info_beside(topic: str) -> str:
-    """Returns the name of the camera_info of an image, which is in the same namespace."""
+def _info_topic(topic: str) -> str:
+    """Returns the name of an image's camera_info, which is in the same namespace."""
     return f"{topic.rpartition('/')[0]}/camera_info" if topic else ""
 
 
 def _placement(section: Mapping[str, Any]) -> tuple[str, Pose]:
-    """Returns the frame that the pose of a sensor is given in, and the pose."""
+    """Returns the reference frame of a sensor's pose, and the pose."""
     if "initial_pose" not in section:
         x, y, z, roll, pitch, yaw = (
             _number(section, f"frame_{key}") for key in ("x", "y", "z", "roll", "pitch", "yaw")
@@ -110,8 +110,8 @@ def _placement(section: Mapping[str, Any]) -> tuple[str, Pose]:
         return _text(section, "origin_frame_id").strip("/"), Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
     if not isinstance(section["initial_pose"], Mapping):
         raise _Fault(
-            f"initial_pose: got '{section['initial_pose']}'; the simulation does not know the names of poses: "
-            "expected reference_frame, position and orientation"
+            f"initial_pose: got '{section['initial_pose']}'; expected reference_frame, position and orientation, "
+            "because the simulation does not know named poses"
         )
     pose = _mapping(section, "initial_pose")
     position, orientation = _mapping(pose, "position"), _mapping(pose, "orientation")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the cameras of a model: a <sensor> of the type camera or depth with one of Gazebo's plugins for ROS."""
+"""Reads the cameras of a model: <sensor> elements of type camera or depth with a ROS plugin of Gazebo."""
 
 from __future__ import annotations
 
@@ -16,25 +16,29 @@ _DEFAULT_RATE_HZ = 30.0
 
 
 def read_camera(xml: SensorXml, seed: int) -> Camera:
-    """Reads a <sensor> of one of `TYPES`.
+    """Reads a <sensor> of a type in `TYPES`.
+
+    Args:
+        xml: The <sensor> with its plugin.
+        seed: Random seed of the simulation, for noise.
 
     Raises:
-        ValueError: A value cannot be used.
+        ValueError: A value is unsupported or invalid.
     """
     sensor, plugin = xml.sensor, xml.plugin
-    kinect = xml.file in DEPTH_PLUGINS or (plugin is None and sensor.node.attributes.get("type") != "camera")
+    with_depth = xml.file in DEPTH_PLUGINS or (plugin is None and sensor.node.attributes.get("type") != "camera")
     depth_range = (0.0, math.inf)
     if plugin is None:
-        topics = _below(xml.require_topic(", ".join(PLUGINS)), kinect)
+        topics = _topics_below(xml.require_topic(", ".join(PLUGINS)), with_depth)
         frame, plugin_rate = xml.link, 0.0
     else:
-        own = sensor.node.attributes.get("name", "camera")
+        sensor_name = sensor.node.attributes.get("name", "camera")
         namespace = xml.namespace()
-        base = resolved(namespace, plugin.text("cameraName", own)).lstrip("/")
-        topics = _of_plugin(xml, base, kinect)
+        base = resolved(namespace, plugin.text("cameraName", sensor_name)).lstrip("/")
+        topics = _plugin_topics(xml, base, with_depth)
         frame = prefixed(namespace, plugin.text("frameName")) if plugin.text("frameName") else xml.link
         plugin_rate = plugin.number("updateRate", 0.0, 0.0)
-        if kinect:
+        if with_depth:
             depth_range = (plugin.number("pointCloudCutoff", 0.4), plugin.number("pointCloudCutoffMax", 5.0))
     pinhole = Pinhole(
         width=int(sensor.number("camera/image/width", 320)),
@@ -53,15 +57,15 @@ def read_camera(xml: SensorXml, seed: int) -> Camera:
     return Camera(xml.name, frame, parent, in_parent, rate, topics, pinhole, depth_range, noise, seed)
 
 
-def _below(base: str, kinect: bool) -> CameraTopics:
-    if not kinect:
+def _topics_below(base: str, with_depth: bool) -> CameraTopics:
+    if not with_depth:
         return CameraTopics(base, f"{base.rpartition('/')[0]}/camera_info".lstrip("/"))
     return CameraTopics(
         f"{base}/image", f"{base}/camera_info", f"{base}/depth_image", f"{base}/camera_info", f"{base}/points"
     )
 
 
-def _of_plugin(xml: SensorXml, base: str, kinect: bool) -> CameraTopics:
+def _plugin_topics(xml: SensorXml, base: str, with_depth: bool) -> CameraTopics:
     plugin = xml.plugin
     assert plugin is not None
 
@@ -69,7 +73,7 @@ def _of_plugin(xml: SensorXml, base: str, kinect: bool) -> CameraTopics:
         return resolved(base, plugin.text(key, default)).lstrip("/")
 
     image, info = topic("imageTopicName", "image_raw"), topic("cameraInfoTopicName", "camera_info")
-    if not kinect:
+    if not with_depth:
         return CameraTopics(image, info)
     return CameraTopics(
         image,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulated cameras: where they are, what they see, and the geometry of a pinhole.
+"""Simulated cameras: poses, images and the pinhole projection.
 
-An optical frame has z forwards, x to the right and y downwards in the image (REP 103).
+In an optical frame, z points forwards, x to the right and y down in the image (REP 103).
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
 Cloud = npt.NDArray[np.void]
 
-_NOTHING = 1.0 - 1e-6
-"""Depth in OpenGL's buffer from which on nothing is seen; TinyRenderer's empty pixels have not quite 1."""
+_EMPTY_DEPTH = 1.0 - 1e-6
+"""Minimum depth value of an empty pixel in OpenGL's buffer; TinyRenderer's empty pixels are slightly below 1."""
 POINT = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4", "<f4", "<f4", "<u4"]})
-"""A point of a cloud: position [m], and colour as 0x00RRGGBB."""
+"""Point of a cloud: position [m] in the optical frame, and colour as 0x00RRGGBB."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
-    """The geometry of an image; the centre of the first pixel is at (0, 0), and pixels are square.
+    """Pinhole projection with square pixels; the centre of the first pixel has the coordinates (0, 0).
 
     Attributes:
-        width: [pixel]
-        height: [pixel]
-        horizontal_fov: Angle between the left and the right edge of the image [rad].
-        near: Depth of the nearest surface that is seen [m].
-        far: Depth of the farthest [m].
+        width: Image width [pixel].
+        height: Image height [pixel].
+        horizontal_fov: Angle between the left and right image edges [rad].
+        near: Minimum depth of visible surfaces [m].
+        far: Maximum depth of visible surfaces [m].
     """
 
     width: int = 640
@@ -48,24 +48,24 @@ class Pinhole:
 
     @property
     def focal_length(self) -> float:
-        """Distance from the lens to the image [pixel]."""
+        """Returns the focal length [pixel]."""
         return self.width / (2 * math.tan(self.horizontal_fov / 2))
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Where the optical axis meets the image [pixel]: column and row."""
+        """Returns the column and row of the principal point [pixel]."""
         return (self.width - 1) / 2, (self.height - 1) / 2
 
     def intrinsics(self) -> tuple[float, ...]:
-        """Returns the matrix K of the camera, row by row [pixel]."""
+        """Returns the camera matrix K in row-major order [pixel], 9 values."""
         (column, row), focal = self.centre, self.focal_length
         return (focal, 0.0, column, 0.0, focal, row, 0.0, 0.0, 1.0)
 
     def opengl_projection(self, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
-        """Returns OpenGL's projection matrix, column by column.
+        """Returns OpenGL's projection matrix in column-major order, 16 values.
 
         Args:
-            shift: What the image is moved by, right and down [pixel].
+            shift: Shift of the image to the right and down [pixel].
         """
         focal, near, far = self.focal_length, self.near, self.far
         column_1 = (2 * focal / self.width, 0.0, 0.0, 0.0)
@@ -74,22 +74,25 @@ class Pinhole:
         return (*column_1, *column_2, *column_3, 0.0, 0.0, 2 * near * far / (near - far), 0.0)
 
     def depth_from_buffer(self, values: npt.NDArray[np.float32]) -> Depth:
-        """Converts OpenGL's depth, from 0 at `near` to 1 at `far`, to metres along the optical axis.
+        """Converts OpenGL's depth buffer, from 0 at `near` to 1 at `far`, to depths along the optical axis.
+
+        Args:
+            values: Depth buffer, shape (height, width).
 
         Returns:
-            Depth [m]; not a number where nothing is seen.
+            Depths, shape (height, width) [m]; NaN for empty pixels.
         """
         buffer = values.astype(np.float64)
         depth = self.far * self.near / (self.far - (self.far - self.near) * buffer)
-        depth[buffer >= _NOTHING] = np.nan
+        depth[buffer >= _EMPTY_DEPTH] = np.nan
         return depth.astype(np.float32)
 
     def cloud(self, depth: Depth, rgb: Image) -> Cloud:
-        """Returns a point in the optical frame for every pixel, in the order of the image.
+        """Returns one point in the optical frame per pixel, in the order of the image.
 
         Args:
-            depth: (height, width) [m]; the points of pixels without depth are not numbers.
-            rgb: (height, width, 3)
+            depth: Depths, shape (height, width) [m]; the points of pixels without depth are NaN.
+            rgb: Colours, shape (height, width, 3).
         """
         column, row = self.centre
         points = np.empty((self.height, self.width), POINT)
@@ -103,14 +106,14 @@ class Pinhole:
 
 @dataclass(frozen=True, slots=True)
 class CameraTopics:
-    """Names of topics; an empty one is not published.
+    """Topic names of a camera; topics with an empty name are not published.
 
     Attributes:
-        image: sensor_msgs/Image, rgb8.
-        image_info: sensor_msgs/CameraInfo of the image.
-        depth: sensor_msgs/Image, 32FC1 [m].
-        depth_info: sensor_msgs/CameraInfo of the depth image.
-        points: sensor_msgs/PointCloud2 with colours.
+        image: Topic of the sensor_msgs/Image in rgb8.
+        image_info: Topic of the image's sensor_msgs/CameraInfo.
+        depth: Topic of the depth image, a sensor_msgs/Image in 32FC1 [m].
+        depth_info: Topic of the depth image's sensor_msgs/CameraInfo.
+        points: Topic of the sensor_msgs/PointCloud2 with colours.
     """
 
     image: str = ""
@@ -122,19 +125,19 @@ class CameraTopics:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A simulated camera.
+    """Simulated camera.
 
     Attributes:
-        name: Differs from camera to camera.
-        frame_id: Its optical frame, for the headers of its messages.
-        parent: What it is fastened to: "world", or "model::link".
-        optical_in_parent: Pose of the optical frame in the frame of the parent.
-        rate_hz: Images in a second of simulated time.
-        topics: Where it publishes.
-        pinhole: The geometry of its images.
-        depth_range: Least and greatest depth that is measured [m].
-        noise: Of the colours, whose range is 0 to 1.
-        seed: Of the simulation.
+        name: Unique name of the camera.
+        frame_id: Optical frame in message headers.
+        parent: Entity that the camera is fixed to: "world", or "model::link".
+        optical_in_parent: Pose of the optical frame in the parent's frame.
+        rate_hz: Frame rate in simulated time [Hz].
+        topics: Names of the published topics.
+        pinhole: Projection of the images.
+        depth_range: Minimum and maximum measured depth [m].
+        noise: Noise of the colours, whose range is 0 to 1.
+        seed: Random seed of the simulation.
     """
 
     name: str
@@ -165,29 +168,29 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class CameraImage:
-    """What a camera saw.
+    """Image of a camera.
 
     Attributes:
-        rgb: (height, width, 3)
-        depth: (height, width) [m]; not a number where it saw nothing.
+        rgb: Colours, shape (height, width, 3).
+        depth: Depths, shape (height, width) [m]; NaN for empty pixels.
     """
 
     rgb: Image
     depth: Depth
 
     def within(self, depth_range: tuple[float, float]) -> CameraImage:
-        """Returns the same image without depth outside a range [m]."""
+        """Returns the same image without depths outside a range [m]."""
         low, high = depth_range
         with np.errstate(invalid="ignore"):
-            kept = (self.depth >= low) & (self.depth <= high)
-        return CameraImage(self.rgb, np.where(kept, self.depth, np.float32(np.nan)))
+            in_range = (self.depth >= low) & (self.depth <= high)
+        return CameraImage(self.rgb, np.where(in_range, self.depth, np.float32(np.nan)))
 
     def with_noise(self, source: NoiseSource, time_ns: int) -> CameraImage:
-        """Returns the same image with noise on its colours.
+        """Returns the same image with noise on the colours.
 
         Args:
-            source: The noise of the camera, of one channel.
-            time_ns: When it was taken [ns].
+            source: Noise source of the camera, with one channel.
+            time_ns: Simulated time of the image [ns].
         """
         if not source.active:
             return self

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Resolves which renderer draws what cameras see: OpenGL wherever it works, whatever the load of the machine is.
+"""Selects the camera renderer: OpenGL if it works on this machine, independent of the machine's load.
 
-A graphics driver that does not work may end the process that tries it, so it is tried in a process of its own:
+A faulty graphics driver may terminate the process that uses it, so a separate process tests OpenGL:
 `python3 -m modular_framework_simulation.sensors.drawing_choice`.
 """
 
@@ -22,13 +22,13 @@ from modular_framework_simulation.sensors.renderer import Drawing, Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 
 AUTO = "auto"
-"""Name of the rule: OpenGL if it draws on this machine, TinyRenderer otherwise."""
+"""Value of the parameter that selects OpenGL if it works on this machine, and TinyRenderer otherwise."""
 _TIMEOUT_S = 300.0
-"""Longest trial [s]; only a driver that hangs takes so long, also on a busy machine."""
+"""Timeout of the test [s]; even on a busy machine, only a hanging driver takes this long."""
 
 
 def resolved_drawing(name: str) -> Drawing:
-    """Returns the renderer of a value of the parameter ``~renderer``; on the same machine always the same one."""
+    """Returns the renderer for a value of the parameter ``~renderer``, always the same on the same machine."""
     if name != AUTO:
         return Drawing(name)
     return Drawing.EGL if _opengl_draws() else Drawing.TINY
@@ -42,10 +42,10 @@ def _opengl_draws() -> bool:
 
 
 def main() -> int:
-    """Draws a box on a floor by OpenGL.
+    """Renders a box on a floor with OpenGL.
 
     Returns:
-        Exit code: 0 if the box is in the image, 1 otherwise.
+        Exit code: 0 if the image contains the box, 1 otherwise.
 
     Raises:
         SimulationError: OpenGL cannot be loaded.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads values below an element of a sensor, and notes what of it was not read."""
+"""Reads values below a sensor element, and lists the elements that were not read."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise
 
 _NOISE_TYPES = ("none", "gaussian", "gaussian_quantized")
-_READ_BEFORE = ("pose",)
+_READ_ELSEWHERE = ("pose",)
 
 
 class ElementReader:
-    """Values below one element, by paths such as "scan/horizontal/samples".
+    """Reads values below an element, by paths such as "scan/horizontal/samples".
 
     Faults are raised as ValueErrors that begin with the path.
 
@@ -24,17 +24,17 @@ class ElementReader:
 
     def __init__(self, node: XmlNode) -> None:
         self.node = node
-        self._read: set[int] = {id(child) for child in node.children if child.tag in _READ_BEFORE}
+        self._read: set[int] = {id(child) for child in node.children if child.tag in _READ_ELSEWHERE}
 
     def find(self, path: str) -> XmlNode | None:
-        """Returns the element at a path, None where there is none."""
+        """Returns the element at a path; None if the element does not exist."""
         node = self.node.find_path(*path.split("/"))
         if node is not None:
             self._read.add(id(node))
         return node
 
     def skip(self, path: str) -> None:
-        """Marks everything at and below a path as read."""
+        """Marks an element and all elements below as read."""
         nodes = [node] if (node := self.node.find_path(*path.split("/"))) is not None else []
         while nodes:
             each = nodes.pop()
@@ -42,15 +42,20 @@ class ElementReader:
             nodes += each.children
 
     def text(self, path: str, default: str = "") -> str:
-        """Returns the text at a path; the default where it is empty."""
+        """Returns the text at a path; the default for an empty or missing element."""
         node = self.find(path)
         return (node.text.strip() if node is not None else "") or default
 
-    def number(self, path: str, default: float, least: float = -math.inf) -> float:
+    def number(self, path: str, default: float, minimum: float = -math.inf) -> float:
         """Returns the number at a path.
 
+        Args:
+            path: Path of the element.
+            default: Value for an empty or missing element.
+            minimum: Minimum of the number.
+
         Raises:
-            ValueError: It is no finite number, or less than allowed.
+            ValueError: The text is not a finite number, or the number is below the minimum.
         """
         text = self.text(path)
         if not text:
@@ -61,15 +66,15 @@ class ElementReader:
             value = math.nan
         if not math.isfinite(value):
             raise ValueError(f"<{path}>: got '{text}'; expected a number")
-        if value < least:
-            raise ValueError(f"<{path}>: got {value:g}; allowed: {least:g} or more")
+        if value < minimum:
+            raise ValueError(f"<{path}>: got {value:g}; allowed: {minimum:g} or more")
         return value
 
     def flag(self, path: str, default: bool) -> bool:
-        """Returns the truth value at a path.
+        """Returns the bool at a path.
 
         Raises:
-            ValueError: It is none.
+            ValueError: The text is not true, false, 1 or 0.
         """
         text = self.text(path).lower()
         if text in ("", "true", "1", "false", "0"):
@@ -77,10 +82,10 @@ class ElementReader:
         raise ValueError(f"<{path}>: got '{text}'; allowed: true, false, 1, 0")
 
     def vector(self, path: str) -> tuple[float, float, float]:
-        """Returns the three numbers at a path; zeros where there are none.
+        """Returns the three numbers at a path; zeros for an empty or missing element.
 
         Raises:
-            ValueError: They are not three numbers.
+            ValueError: The text is not three numbers.
         """
         text = self.text(path, "0 0 0")
         try:
@@ -93,7 +98,7 @@ class ElementReader:
         """Returns the pose at a path: x y z [m] roll pitch yaw [rad].
 
         Raises:
-            ValueError: It is not six numbers.
+            ValueError: The text is not six numbers.
         """
         text = self.text(path, "0 0 0 0 0 0")
         try:
@@ -103,10 +108,10 @@ class ElementReader:
         return Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
 
     def noise(self, path: str) -> Noise:
-        """Returns the <noise> at a path; none where there is none.
+        """Returns the <noise> at a path; `NO_NOISE` for a missing element.
 
         Raises:
-            ValueError: It is of a kind that is not simulated, or a value is no number in range.
+            ValueError: The noise type is not supported, or a value is not a number in its range.
         """
         node = self.find(path)
         if node is None:
@@ -122,7 +127,7 @@ class ElementReader:
         return Noise(**values) if kind != "none" else NO_NOISE
 
     def unread(self) -> list[str]:
-        """Returns the paths below the element that nothing has read; of a branch the root only."""
+        """Returns the paths of elements that were not read; for an unread branch, only the topmost path."""
         return list(dict.fromkeys(self._unread(self.node, "")))
 
     def _unread(self, node: XmlNode, path: str) -> list[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Force-torque sensors: the load on a joint, as Gazebo's sensor measures it."""
+"""Force-torque sensors, which measure the load on a joint as in Gazebo."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ PLUGINS = ("gazebo_ros_ft_sensor",)
 DEFAULT_RATE_HZ = 100.0
 
 _MEASURED_JOINTS = ("fixed", "revolute", "continuous")
-"""The engine's reaction on a slide differs from the weight it carries."""
+"""Joint types of the sensors; the engine's reaction on a prismatic joint differs from the carried weight."""
 _FRAMES = ("child", "parent", "sensor")
 _DIRECTIONS = ("child_to_parent", "parent_to_child")
 
 Noises = tuple[Noise, Noise, Noise, Noise, Noise, Noise]
-_QUIET: Noises = (NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE)
+_NO_NOISES: Noises = (NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE)
 
 
 @dataclass(frozen=True, slots=True)
 class ForceTorqueSensor(Sensor):
-    """A sensor in a joint; its link is the child of the joint.
+    """Force-torque sensor of a joint; the sensor's link is the child of the joint.
 
     Attributes:
         joint: Name of the joint.
-        parent_link: The link that carries the joint.
-        in_frame: Whose axes the wrench is given in: "child", "parent" or "sensor".
-        of_child: Whether the wrench is that of the child on the parent, not the other way round.
-        noise: Of the force along each axis [N], and of the torque about each [Nm].
+        parent_link: Name of the joint's parent link.
+        in_frame: Frame of the wrench: "child", "parent" or "sensor".
+        of_child: Whether the child's wrench on the parent is measured, instead of the parent's wrench on the child.
+        noise: Noise of the force x, y, z [N] and of the torque x, y, z [Nm].
     """
 
     joint: str = ""
     parent_link: str = ""
     in_frame: str = "child"
     of_child: bool = True
-    noise: Noises = _QUIET
+    noise: Noises = _NO_NOISES
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,17 +59,17 @@ def read_force_torque(xml: SensorXml) -> ForceTorqueSensor:
     """Reads a <sensor type="force_torque"> of a joint, or libgazebo_ros_ft_sensor.so.
 
     Raises:
-        ValueError: A value cannot be used.
+        ValueError: A value is unsupported or invalid.
     """
     in_plugin = xml.plugin is not None and not xml.joint
     joint = f"{xml.scope}{xml.plugin.text('jointName')}" if in_plugin and xml.plugin else xml.joint
     allowed = [name for name, part in xml.model.joints.items() if part.kind in _MEASURED_JOINTS]
     if joint not in allowed:
         key = "<jointName>: got" if in_plugin else "is in joint"
-        raise ValueError(f"{key} '{joint}'; allowed are joints that are fixed or turn: {', '.join(allowed)}")
+        raise ValueError(f"{key} '{joint}'; allowed are fixed and revolute joints: {', '.join(allowed)}")
     part = xml.model.joints[joint]
     if xml.plugin is None:
-        return _of_joint(xml, joint, part)
+        return _read_joint_sensor(xml, joint, part)
     noise = Noise(stddev=xml.plugin.number("gaussianNoise", 0.0, 0.0))
     return ForceTorqueSensor(
         *(xml.name, xml.model.name, part.child, Pose()),
@@ -82,7 +82,7 @@ def read_force_torque(xml: SensorXml) -> ForceTorqueSensor:
     )
 
 
-def _of_joint(xml: SensorXml, joint: str, part: JointPart) -> ForceTorqueSensor:
+def _read_joint_sensor(xml: SensorXml, joint: str, part: JointPart) -> ForceTorqueSensor:
     topic = xml.require_topic(f"{PLUGINS[0]}, of the model")
     in_frame = xml.sensor.text("force_torque/frame", "child")
     direction = xml.sensor.text("force_torque/measure_direction", "child_to_parent")
@@ -105,19 +105,19 @@ class JointLoad:
     """Measures the load on a joint of a model.
 
     Args:
-        world: Where the model is.
-        sensor: The joint.
-        seed: Of the simulation.
+        world: World of the model.
+        sensor: Description of the sensor.
+        seed: Random seed of the simulation.
 
     Raises:
-        UnknownEntityError: There is no such model or joint.
+        UnknownEntityError: The model or the joint does not exist.
     """
 
     def __init__(self, world: PhysicsWorld, sensor: ForceTorqueSensor, seed: int = 0) -> None:
         self._world, self._sensor = world, sensor
         self._noise = NoiseSource(seed, sensor.name, sensor.noise)
-        self._found: tuple[int, ...] = ()  # instance and trees of the model in which the joint was found
-        self._measures = False
+        self._body_ids: tuple[int, ...] = ()  # instance and body ids of the model at the last search of the joint
+        self._measured = False
         self._find()
 
     def _find(self) -> None:
@@ -136,34 +136,34 @@ class JointLoad:
         joints_of_spec = body.spec.joints if body.spec is not None else ()
         self._joint_in_child = next((each.pose for each in joints_of_spec if each.name == self._sensor.joint), Pose())
 
-    def rest(self) -> None:
-        """Forgets that the engine measures: the next call of `measure` begins again."""
-        self._measures = False
+    def reset(self) -> None:
+        """Discards the state of the measurement; the next call of `measure` starts again."""
+        self._measured = False
 
     def measure(self) -> Wrench | None:
-        """Returns the wrench in the last physics step; None at first, when the engine has not measured it."""
+        """Returns the wrench of the last physics step; None for the first step, which the engine has not measured."""
         model = self._sensor.model
-        found = (self._world.instance(model), *(part.number for part in self._world.body(model).parts))
-        if found != self._found:  # also after a restart or a change of a mass, which make the body again
-            self._found, self._measures = found, False
+        body_ids = (self._world.instance(model), *(part.number for part in self._world.body(model).parts))
+        if body_ids != self._body_ids:  # restarts and changes of the mass create a new body
+            self._body_ids, self._measured = body_ids, False
             self._find()
             self._world.engine.measure_joint_load(self._tree.number, self._index)
             self._world.rest.disturb()
-        measures, self._measures = self._measures, True
-        return self._noisy(self._wrench()) if measures else None
+        measured, self._measured = self._measured, True
+        return self._noisy(self._wrench()) if measured else None
 
     def _wrench(self) -> Wrench:
-        """Returns the wrench with which the child link acts on its parent, unless the sensor has it the other way.
+        """Returns the wrench of the child link on its parent, or of the parent on the child, as the sensor specifies.
 
-        It is given about the origin of the joint, and in the axes of the child link: Gazebo's defaults.
+        The reference point is the origin of the joint, and the default frame is the child link's, as in Gazebo.
         """
-        turn = self._axes_of_joint().quaternion
+        rotation = self._axes_of_joint().quaternion
         load = self._world.engine.joint_load(self._tree.number, self._index)
-        force, torque = (rotate_vector(turn, each) for each in load)
+        force, torque = (rotate_vector(rotation, each) for each in load)
         return Wrench(force, torque) if self._sensor.of_child else Wrench(_negative(force), _negative(torque))
 
     def _axes_of_joint(self) -> Pose:
-        """Returns the pose of the joint in the frame whose axes the wrench is given in."""
+        """Returns the pose of the joint in the frame of the wrench."""
         sensor = self._sensor
         match sensor.in_frame:
             case "child":

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inertial measurement units: orientation, angular velocity and specific force, in the frame of the sensor (REP 145).
+"""Inertial measurement units, which measure orientation, angular velocity and specific force (REP 145).
 
-The specific force is the acceleration without that of gravity: at rest it points up with the size of gravity. It is the
-mean over the time since the measurement before.
+The specific force is the acceleration minus the acceleration of gravity; at rest, it points up with the magnitude of
+gravity. The measured value is the mean since the previous measurement.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ MODEL_PLUGINS = ("gazebo_ros_imu", "hector_gazebo_ros_imu")
 PLUGINS = ("gazebo_ros_imu_sensor", *MODEL_PLUGINS)
 
 Noises = tuple[Noise, Noise, Noise]
-_QUIET: Noises = (NO_NOISE, NO_NOISE, NO_NOISE)
+_NO_NOISES: Noises = (NO_NOISE, NO_NOISE, NO_NOISE)
 
 
 @dataclass(frozen=True, slots=True)
 class ImuSensor(Sensor):
-    """An inertial measurement unit.
+    """Inertial measurement unit.
 
     Attributes:
-        rate_noise: Of the angular velocity about each axis [rad/s].
-        acceleration_noise: Of the specific force along each axis [m/s^2].
-        orientation_noise: Of the elements of the quaternion.
-        turn: Rotation that is put before the orientation.
-        from_initial: Whether the orientation is that since the sensor appeared, not that in the world.
+        rate_noise: Noise of the angular velocity about x, y, z [rad/s].
+        acceleration_noise: Noise of the specific force along x, y, z [m/s^2].
+        orientation_noise: Noise of the elements of the quaternion.
+        offset_rotation: Rotation that is multiplied from the left to the orientation, as a quaternion xyzw.
+        from_initial: Whether the orientation is relative to the initial orientation, instead of the world frame.
     """
 
-    rate_noise: Noises = _QUIET
-    acceleration_noise: Noises = _QUIET
+    rate_noise: Noises = _NO_NOISES
+    acceleration_noise: Noises = _NO_NOISES
     orientation_noise: Noise = NO_NOISE
-    turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    offset_rotation: Quaternion = (0.0, 0.0, 0.0, 1.0)
     from_initial: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """What an inertial measurement unit says.
+    """Measurement of an inertial measurement unit.
 
     Attributes:
-        orientation: Of the sensor, xyzw.
-        angular_velocity: In the frame of the sensor [rad/s].
-        specific_force: In the frame of the sensor [m/s^2].
+        orientation: Orientation of the sensor, quaternion xyzw.
+        angular_velocity: Angular velocity in the sensor frame [rad/s].
+        specific_force: Specific force in the sensor frame [m/s^2].
     """
 
     orientation: Quaternion
@@ -62,78 +62,86 @@ class ImuReading:
 
 
 def read_imu(xml: SensorXml) -> ImuSensor:
-    """Reads a <sensor type="imu">, or one of the plugins of the model that are one.
+    """Reads a <sensor type="imu">, or an IMU plugin of the model.
 
     Raises:
-        ValueError: A value cannot be used.
+        ValueError: A value is unsupported or invalid.
     """
-    quiet = ImuSensor(xml.name, xml.model.name, xml.link, xml.pose, "", "", xml.sensor.number("update_rate", 0.0, 0.0))
+    noiseless = ImuSensor(
+        xml.name, xml.model.name, xml.link, xml.pose, "", "", xml.sensor.number("update_rate", 0.0, 0.0)
+    )
     rates, forces = (_noises(xml, kind) for kind in ("angular_velocity", "linear_acceleration"))
-    sensor = replace(quiet, rate_noise=rates, acceleration_noise=forces)
+    sensor = replace(noiseless, rate_noise=rates, acceleration_noise=forces)
     if xml.plugin is None:
         return replace(sensor, topic=xml.require_topic(", ".join(PLUGINS)), frame_id=xml.link)
-    return _of_sensor(xml, sensor) if xml.file == PLUGINS[0] else _of_model(xml, sensor)
+    return _read_sensor_plugin(xml, sensor) if xml.file == PLUGINS[0] else _read_model_plugin(xml, sensor)
 
 
 def _noises(xml: SensorXml, kind: str) -> Noises:
-    """Returns the noise along each axis."""
+    """Returns the noise along x, y and z."""
     x, y, z = (xml.sensor.noise(f"imu/{kind}/{axis}/noise") for axis in "xyz")
     return (x, y, z)
 
 
-def _of_sensor(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
-    """Reads libgazebo_ros_imu_sensor.so, whose topics are always below the namespace."""
+def _read_sensor_plugin(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
+    """Reads libgazebo_ros_imu_sensor.so, whose topics are always in the namespace."""
     plugin = xml.plugin
     assert plugin is not None
     namespace = xml.namespace() or f"/{xml.model.name}"
     frame = plugin.text("frameName")
     if not frame:
-        raise ValueError("<frameName>: got nothing; expected the frame of its messages")
+        raise ValueError("<frameName>: is empty; expected the frame of the messages")
     stddev = plugin.number("gaussianNoise", 0.0, 0.0)
     return replace(
-        _noisier(sensor, stddev, stddev),
+        _with_more_noise(sensor, stddev, stddev),
         topic=f"{namespace.rstrip('/')}/{plugin.text('topicName', 'imu_data').strip('/')}",
         frame_id=frame,
         rate_hz=slower_of(sensor.rate_hz, plugin.number("updateRateHZ", 1.0, 0.0)),
         orientation_noise=Noise(stddev=stddev),
-        turn=Pose.from_xyz_rpy((0.0, 0.0, 0.0), plugin.vector("rpyOffset")).quaternion,
+        offset_rotation=Pose.from_xyz_rpy((0.0, 0.0, 0.0), plugin.vector("rpyOffset")).quaternion,
         from_initial=plugin.flag("initialOrientationAsReference", False),
     )
 
 
-def _of_model(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
-    """Reads libgazebo_ros_imu.so or hector's, which are plugins of the model and name a link."""
+def _read_model_plugin(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
+    """Reads libgazebo_ros_imu.so or hector's plugin, which belong to the model and name a link."""
     plugin = xml.plugin
     assert plugin is not None
     hector = xml.file == "hector_gazebo_ros_imu"
     link = xml.require_link("bodyName")
-    mounted = xml.pose @ Pose.from_xyz_rpy(plugin.vector("xyzOffset"), plugin.vector("rpyOffset"))
+    sensor_in_link = xml.pose @ Pose.from_xyz_rpy(plugin.vector("xyzOffset"), plugin.vector("rpyOffset"))
     stddev = plugin.number("gaussianNoise", 0.0, 0.0)
     accelerations = plugin.number("accelGaussianNoise", 0.0, 0.0) if hector else stddev
     rates = plugin.number("rateGaussianNoise", 0.0, 0.0) if hector else stddev
     namespace = xml.namespace()
     frame = plugin.text("frameId" if hector else "frameName", link.rpartition("::")[2])
     return replace(
-        _noisier(sensor, rates, accelerations),
+        _with_more_noise(sensor, rates, accelerations),
         link=link,
-        pose=mounted,
+        pose=sensor_in_link,
         topic=resolved(namespace, plugin.text("topicName", "imu" if hector else "/default_imu")),
         frame_id=prefixed("", frame),
         rate_hz=slower_of(sensor.rate_hz, plugin.number("updateRate", 0.0, 0.0)),
     )
 
 
-def _noisier(sensor: ImuSensor, rates: float, accelerations: float) -> ImuSensor:
-    """Adds independent noise with standard deviations for the angular velocity [rad/s] and the force [m/s^2]."""
+def _with_more_noise(sensor: ImuSensor, rates: float, accelerations: float) -> ImuSensor:
+    """Adds independent noise to the angular velocity and the specific force.
 
-    def more(noises: Noises, stddev: float) -> Noises:
+    Args:
+        sensor: Description of the sensor.
+        rates: Standard deviation of the additional noise of the angular velocity [rad/s].
+        accelerations: Standard deviation of the additional noise of the specific force [m/s^2].
+    """
+
+    def increased(noises: Noises, stddev: float) -> Noises:
         x, y, z = (replace(noise, stddev=math.hypot(noise.stddev, stddev)) for noise in noises)
         return (x, y, z)
 
     return replace(
         sensor,
-        rate_noise=more(sensor.rate_noise, rates),
-        acceleration_noise=more(sensor.acceleration_noise, accelerations),
+        rate_noise=increased(sensor.rate_noise, rates),
+        acceleration_noise=increased(sensor.acceleration_noise, accelerations),
     )
 
 
@@ -141,43 +149,43 @@ class Imu:
     """Measures with an inertial measurement unit.
 
     Args:
-        world: Where it is.
-        sensor: The sensor.
-        seed: Of the simulation.
+        world: World of the sensor.
+        sensor: Description of the sensor.
+        seed: Random seed of the simulation.
 
     Raises:
-        UnknownEntityError: The model has no such link.
+        UnknownEntityError: The model does not have the link.
     """
 
     def __init__(self, world: PhysicsWorld, sensor: ImuSensor, seed: int) -> None:
         self._world, self._sensor = world, sensor
         channels = (*sensor.rate_noise, *sensor.acceleration_noise, *(sensor.orientation_noise,) * 4)
         self._noise = NoiseSource(seed, sensor.name, channels)
-        self._before: tuple[int, Vector3] | None = None
+        self._previous: tuple[int, Vector3] | None = None
         pose, _, _ = self._motion()
         self._initial = pose.quaternion
 
-    def rest(self) -> None:
-        """Forgets the last measurement: the next call of `measure` begins again."""
-        self._before = None
+    def reset(self) -> None:
+        """Discards the last measurement; the next call of `measure` starts again."""
+        self._previous = None
 
     def _motion(self) -> tuple[Pose, Vector3, Vector3]:
-        """Returns the pose of the sensor, and its linear and angular velocity, in the world."""
+        """Returns the pose, the linear velocity and the angular velocity of the sensor in the world frame."""
         state = self._world.entity_state(self._sensor.parent)
         pose = state.pose @ self._sensor.pose
         twist = twist_at(state.twist, state.pose, pose)
         return pose, twist.linear, twist.angular
 
     def measure(self) -> ImuReading | None:
-        """Returns the measurement of now; None at first, when there is no velocity before it."""
+        """Returns the current measurement; None for the first call, because a previous velocity is missing."""
         pose, linear, angular = self._motion()
-        now_ns, before = self._world.time_ns, self._before
-        self._before = (now_ns, linear)
-        if before is None or before[0] >= now_ns:
+        now_ns, previous = self._world.time_ns, self._previous
+        self._previous = (now_ns, linear)
+        if previous is None or previous[0] >= now_ns:
             return None
-        passed_s = (now_ns - before[0]) * 1e-9
-        change = zip(linear, before[1], self._world.gravity, strict=True)
-        x, y, z = ((after - earlier) / passed_s - gravity for after, earlier, gravity in change)
+        elapsed_s = (now_ns - previous[0]) * 1e-9
+        change = zip(linear, previous[1], self._world.gravity, strict=True)
+        x, y, z = ((after - earlier) / elapsed_s - gravity for after, earlier, gravity in change)
         to_sensor = pose.inverse().quaternion
         rate, force = rotate_vector(to_sensor, angular), rotate_vector(to_sensor, (x, y, z))
         return self._noisy(ImuReading(self._orientation(pose), rate, force), now_ns)
@@ -186,7 +194,7 @@ class Imu:
         orientation = pose.quaternion
         if self._sensor.from_initial:
             orientation = multiply_quaternions(Pose(quaternion=self._initial).inverse().quaternion, orientation)
-        return multiply_quaternions(self._sensor.turn, orientation)
+        return multiply_quaternions(self._sensor.offset_rotation, orientation)
 
     def _noisy(self, reading: ImuReading, time_ns: int) -> ImuReading:
         exact = np.array([*reading.angular_velocity, *reading.specific_force, *reading.orientation])

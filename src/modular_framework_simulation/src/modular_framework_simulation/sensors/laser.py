@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Laser scanners: distances to the collision shapes along a fan of rays in the x-y plane of the sensor."""
+"""Laser scanners, which measure distances to collision shapes along rays in the sensor's x-y plane."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from modular_framework_urdf.rotations import rotate_vector
 
 TYPES = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 PLUGINS = ("gazebo_ros_laser", "gazebo_ros_gpu_laser")
-_MOST_SAMPLES = 100_000
+_MAX_SAMPLES = 100_000
 _DEFAULT_TOPIC = _DEFAULT_FRAME = "/world"
-"""As gazebo_plugins have them."""
+"""Default names of gazebo_plugins."""
 
 
 @dataclass(frozen=True, slots=True)
 class LaserSensor(Sensor):
-    """A laser scanner.
+    """Laser scanner.
 
     Attributes:
-        samples: How many rays a scan has.
-        min_angle: Of the first ray, about the z axis from the x axis [rad].
-        max_angle: Of the last one [rad].
-        min_range: Nothing nearer is measured [m].
-        max_range: Nothing farther [m].
-        noise: Of a distance [m].
+        samples: Number of rays per scan.
+        min_angle: Angle of the first ray about the z axis, from the x axis [rad].
+        max_angle: Angle of the last ray [rad].
+        min_range: Minimum measured distance [m].
+        max_range: Maximum measured distance [m].
+        noise: Noise of a distance [m].
     """
 
     samples: int = 640
@@ -43,33 +43,33 @@ class LaserSensor(Sensor):
     noise: Noise = NO_NOISE
 
     def angles(self) -> npt.NDArray[np.float64]:
-        """Returns the angle of each ray [rad]; a single one is in the middle of x."""
+        """Returns the angles of the rays, shape (samples,) [rad]; a single ray points along x."""
         if self.samples == 1:
             return np.zeros(1)
         return np.linspace(self.min_angle, self.max_angle, self.samples)
 
     @property
     def angle_increment(self) -> float:
-        """Angle between two rays [rad]."""
+        """Returns the angle between neighbouring rays [rad]."""
         return (self.max_angle - self.min_angle) / (self.samples - 1) if self.samples > 1 else 0.0
 
 
 def read_laser(xml: SensorXml) -> LaserSensor:
-    """Reads a <sensor> of one of `TYPES`.
+    """Reads a <sensor> of a type in `TYPES`.
 
     Raises:
-        ValueError: A value cannot be used.
+        ValueError: A value is unsupported or invalid.
     """
     topic, frame = _names(xml)
     root = "ray" if xml.sensor.find("ray") is not None else "lidar"
     scan, bounds = f"{root}/scan", f"{root}/range"
     rows = xml.sensor.number(f"{scan}/vertical/samples", 1.0)
     if rows > 1:
-        raise ValueError(f"<{scan}/vertical/samples>: got {rows:g}; allowed: 1, LaserScan has a single row")
+        raise ValueError(f"<{scan}/vertical/samples>: got {rows:g}; allowed: 1, because LaserScan has a single row")
     per_sample = xml.sensor.number(f"{scan}/horizontal/resolution", 1.0)
     samples = round(xml.sensor.number(f"{scan}/horizontal/samples", 640.0) * per_sample)
-    if not 1 <= samples <= _MOST_SAMPLES:
-        raise ValueError(f"<{scan}/horizontal/samples>: got {samples}; allowed: 1 to {_MOST_SAMPLES:,}")
+    if not 1 <= samples <= _MAX_SAMPLES:
+        raise ValueError(f"<{scan}/horizontal/samples>: got {samples}; allowed: 1 to {_MAX_SAMPLES:,}")
     low, high = (xml.sensor.number(f"{scan}/horizontal/{key}_angle", 0.0) for key in ("min", "max"))
     if high < low:
         raise ValueError(f"<{scan}/horizontal/max_angle>: got {high:g} rad; allowed: {low:g} (min_angle) or more")
@@ -96,13 +96,13 @@ def _names(xml: SensorXml) -> tuple[str, str]:
 
 
 class Laser:
-    """Measures with a laser scanner.
+    """Measures the distances of a laser scanner.
 
     Args:
-        world: Where it is.
-        sensor: The sensor.
-        scene: The shapes of the world.
-        seed: Of the simulation.
+        world: World of the sensor.
+        sensor: Description of the sensor.
+        scene: Collision shapes of the world.
+        seed: Random seed of the simulation.
     """
 
     def __init__(self, world: PhysicsWorld, sensor: LaserSensor, scene: RayScene, seed: int) -> None:
@@ -111,28 +111,28 @@ class Laser:
         angles = sensor.angles()
         self._directions = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
 
-    def rest(self) -> None:
-        """Has nothing to forget."""
+    def reset(self) -> None:
+        """Does nothing, because the sensor has no state."""
 
     def measure(self) -> npt.NDArray[np.float64]:
-        """Returns the distance along each ray [m].
+        """Returns the distances along the rays, shape (samples,) [m].
 
-        It is infinite where nothing is hit, and minus infinite where something is nearer than measured (REP 117).
+        A distance is infinite if the ray hits nothing, and minus infinite if a shape is below `min_range` (REP 117).
         """
         sensor = self._sensor
         pose = self._world.entity_state(sensor.parent).pose @ sensor.pose
         directions = self._directions @ _axes(pose)
-        starts, ends = (pose.position + directions * reach for reach in (sensor.min_range, sensor.max_range))
+        starts, ends = (pose.position + directions * distance for distance in (sensor.min_range, sensor.max_range))
         span = sensor.max_range - sensor.min_range
         ranges = sensor.min_range + span * self._scene.cast(starts, ends)
         ranges[np.isnan(ranges)] = np.inf
         ranges[ranges <= sensor.min_range] = -np.inf
-        seen = np.isfinite(ranges)
+        measured = np.isfinite(ranges)
         noisy = self._noise.added_to(ranges[None, :], self._world.time_ns)[0]
-        return np.where(seen, np.clip(noisy, sensor.min_range, sensor.max_range), ranges)
+        return np.where(measured, np.clip(noisy, sensor.min_range, sensor.max_range), ranges)
 
 
 def _axes(pose: Pose) -> npt.NDArray[np.float64]:
-    """Returns the axes of a frame as rows."""
+    """Returns the axes of a frame as rows, shape (3, 3)."""
     units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     return np.array([rotate_vector(pose.quaternion, unit) for unit in units])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the collision shape whose surface a point is nearest to: the engine names links, not shapes."""
+"""Finds the collision shape nearest to a contact point, because the engine reports links instead of shapes."""
 
 from __future__ import annotations
 
@@ -15,37 +15,42 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_urdf.rotations import Vector3
 
 
-def nearest_shape(placed: Sequence[tuple[Pose, specs.Geometry]], point: Vector3) -> int:
-    """Returns the index of the shape whose surface is nearest; of a mesh that of its bounding box.
+def nearest_shape(posed_shapes: Sequence[tuple[Pose, specs.Geometry]], point: Vector3) -> int:
+    """Returns the index of the shape whose surface is nearest to a point; the bounding box represents a mesh.
 
     Args:
-        placed: Pose in the world and geometry of each.
-        point: In the world [m].
+        posed_shapes: Shapes with their poses in the world frame.
+        point: Point in the world frame [m].
     """
-    distances = [abs(_distance(shape, (pose.inverse() @ Pose(point)).position)) for pose, shape in placed]
+    distances = [abs(_distance(shape, (pose.inverse() @ Pose(point)).position)) for pose, shape in posed_shapes]
     return distances.index(min(distances))
 
 
 def _distance(shape: specs.Geometry, point: Vector3) -> float:
-    """Returns how far a point in the frame of a shape is from its surface [m]; negative inside."""
+    """Returns the signed distance of a point to the surface of a shape [m], negative inside the shape.
+
+    Args:
+        shape: The shape.
+        point: Point in the frame of the shape [m].
+    """
     x, y, z = point
     match shape:
         case specs.Box(size=(a, b, c)):
-            return _box((abs(x) - a / 2, abs(y) - b / 2, abs(z) - c / 2))
+            return _box_distance((abs(x) - a / 2, abs(y) - b / 2, abs(z) - c / 2))
         case specs.Cylinder(radius=radius, length=length):
-            return _box((math.hypot(x, y) - radius, abs(z) - length / 2))
+            return _box_distance((math.hypot(x, y) - radius, abs(z) - length / 2))
         case specs.Sphere(radius=radius):
             return math.hypot(x, y, z) - radius
         case specs.Plane(normal=(a, b, c)):
             return a * x + b * y + c * z
         case specs.Mesh():
             low, high = _bounds(shape)
-            return _box(tuple(max(p - b, a - p) for p, a, b in zip(point, low, high, strict=True)))
+            return _box_distance(tuple(max(p - b, a - p) for p, a, b in zip(point, low, high, strict=True)))
 
 
-def _box(beyond: Sequence[float]) -> float:
-    """Returns the distance to a box from how far a point is beyond its sides along each axis."""
-    return math.hypot(*(max(each, 0.0) for each in beyond)) + min(max(beyond), 0.0)
+def _box_distance(face_distances: Sequence[float]) -> float:
+    """Returns the signed distance to a box from the signed distances to its faces along each axis."""
+    return math.hypot(*(max(each, 0.0) for each in face_distances)) + min(max(face_distances), 0.0)
 
 
 @functools.lru_cache(maxsize=256)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Noise of sensors: what is added to a value depends on the seed, the sensor and simulated time, and on nothing else.
+"""Noise of sensors, which depends only on the seed, the sensor and the simulated time.
 
-So a measurement does not depend on when somebody subscribed, and a run that begins again has the same noise.
+A measurement is therefore independent of its subscribers, and a restarted run has the same noise.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import numpy.typing as npt
 
 Values = npt.NDArray[np.float64]
 
-_BIASES = 1
-"""The part of the random numbers that biases are drawn from; part 0 has those of measurements."""
+_BIAS_STREAM = 1
+"""Stream of random numbers for biases; stream 0 is for measurements."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """A noise model, as the <noise> of SDF has it; the unit is that of what is measured.
+    """Noise model of an SDF <noise>, in the unit of the measured value.
 
     Attributes:
-        mean: Of what is added to each value.
-        stddev: Its standard deviation.
-        bias_mean: Mean of a bias that stays the same; its sign is drawn.
-        bias_stddev: Standard deviation of the bias.
-        precision: Values are rounded to multiples of it; 0: they are not.
+        mean: Mean of the additive noise.
+        stddev: Standard deviation of the additive noise.
+        bias_mean: Mean of the constant bias, whose sign is random.
+        bias_stddev: Standard deviation of the constant bias.
+        precision: Step of the quantization; 0 for no quantization.
     """
 
     mean: float = 0.0
@@ -47,16 +47,16 @@ NO_NOISE = Noise()
 
 
 class NoiseSource:
-    """The noise of one sensor.
+    """Noise source of one sensor.
 
     Args:
-        seed: Of the simulation.
-        sensor: Name of the sensor, which no other one has.
-        channels: The noise of each of the values that it measures.
+        seed: Random seed of the simulation.
+        sensor: Unique name of the sensor.
+        channels: Noise models of the measured values.
 
     Attributes:
-        active: Whether there is any noise.
-        biases: What is added to the values of each channel all the time.
+        active: Whether any channel is noisy.
+        biases: Constant bias of each channel.
     """
 
     def __init__(self, seed: int, sensor: str, channels: tuple[Noise, ...]) -> None:
@@ -64,20 +64,20 @@ class NoiseSource:
         self._key = int.from_bytes(digest[:16], "big")
         self._channels = channels
         self.active = any(channel != NO_NOISE for channel in channels)
-        random = self._random(0, _BIASES)
-        drawn = [random.normal(each.bias_mean, each.bias_stddev) * random.choice((-1.0, 1.0)) for each in channels]
-        self.biases: tuple[float, ...] = tuple(float(bias) for bias in drawn)
+        random = self._random(0, _BIAS_STREAM)
+        biases = [random.normal(each.bias_mean, each.bias_stddev) * random.choice((-1.0, 1.0)) for each in channels]
+        self.biases: tuple[float, ...] = tuple(float(bias) for bias in biases)
 
-    def _random(self, time_ns: int, part: int = 0) -> np.random.Generator:
-        """Returns random numbers of one instant; 2^64 can be drawn before they meet those of another."""
-        return np.random.Generator(np.random.Philox(key=self._key, counter=(part << 192) | (time_ns << 64)))
+    def _random(self, time_ns: int, stream: int = 0) -> np.random.Generator:
+        """Returns a random generator for one time, with 2^64 numbers before the stream of the next nanosecond."""
+        return np.random.Generator(np.random.Philox(key=self._key, counter=(stream << 192) | (time_ns << 64)))
 
     def added_to(self, values: Values, time_ns: int) -> Values:
-        """Returns values with noise; without noise the same object.
+        """Returns values with noise; without noise, the same object.
 
         Args:
-            values: One row a channel, (channels,) or (channels, n).
-            time_ns: When they were measured [ns].
+            values: Measured values with one row per channel, shape (channels,) or (channels, n).
+            time_ns: Simulated time of the measurement [ns].
         """
         if not self.active:
             return values

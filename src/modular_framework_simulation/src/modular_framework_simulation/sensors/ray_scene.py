@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Casts rays at the collision shapes of a world.
 
-The shapes are triangles in an engine of their own, in which nothing moves by itself: rays at the convex shapes of the
-physics engine miss (70 % of those at a cylinder of 0.4 m, measured with PyBullet 3.2.7), rays at triangles do not.
+The shapes are triangle meshes in a separate engine without physics. Rays miss convex shapes of the physics engine (70 %
+of the rays at a cylinder of 0.4 m, measured with PyBullet 3.2.7), but they do not miss triangles.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_engine import load_pybullet
 from modular_framework_simulation.sensors.sensor_xml import LinkShapes
 
-_SECTIONS = 256
-"""Sides of what stands for a cylinder: its radius is right within 0.01 %."""
+_CYLINDER_SIDES = 256
+"""Sides of a cylinder's triangle mesh; the radius error is below 0.01 %."""
 _SUBDIVISIONS = 5
-"""Of the icosahedron that stands for a ball: its radius is right within 0.04 %."""
+"""Subdivisions of a sphere's icosahedron; the radius error is below 0.04 %."""
 
 Points = npt.NDArray[np.float64]
 
 
 class RayScene:
-    """The collision shapes of all models, where they are.
+    """Copy of the collision shapes of all models, at their current poses.
 
     Args:
-        world: The models.
-        robots: Shapes of the robots, by their names: the world knows those of other models itself.
+        world: World of the models.
+        robots: Collision shapes of the robots by robot name; the world only stores the shapes of other models.
     """
 
     def __init__(self, world: PhysicsWorld, robots: Mapping[str, LinkShapes]) -> None:
@@ -48,34 +48,34 @@ class RayScene:
         self._revision = -1
 
     def _open(self) -> None:
-        """Opens the engine; nobody pays for it who casts no ray."""
+        """Opens the engine on the first ray, so that worlds without rays do not need the engine."""
         self._api = load_pybullet()
         self._client = self._api.connect(self._api.DIRECT)
         self._folder = tempfile.TemporaryDirectory(prefix="rays_")
 
     def cast(self, starts: Points, ends: Points) -> Points:
-        """Returns where rays first meet a shape.
+        """Finds the first intersection of each ray with a shape.
 
         Args:
-            starts: (n, 3) in the world [m].
-            ends: (n, 3) in the world [m].
+            starts: Start points in the world frame, shape (n, 3) [m].
+            ends: End points in the world frame, shape (n, 3) [m].
 
         Returns:
-            (n,) share of the way from start to end; not a number where nothing is met.
+            Positions of the intersections as fractions of the rays, shape (n,); NaN for rays without intersection.
         """
         if self._client < 0:
             self._open()
-        self._follow()
+        self._update()
         batch = self._api.MAX_RAY_INTERSECTION_BATCH_SIZE - 1
-        shares: list[float] = []
+        fractions: list[float] = []
         for first in range(0, len(starts), batch):
             rays = (points[first : first + batch].tolist() for points in (starts, ends))
             hits = self._api.rayTestBatch(*rays, physicsClientId=self._client)
-            shares += [hit[2] if hit[0] >= 0 else np.nan for hit in hits]
-        return np.array(shares)
+            fractions += [hit[2] if hit[0] >= 0 else np.nan for hit in hits]
+        return np.array(fractions)
 
-    def _follow(self) -> None:
-        """Brings the shapes in step with the world."""
+    def _update(self) -> None:
+        """Updates the shapes to the current state of the world."""
         world = self._world
         names = {world.instance(name): name for name in world.names()}
         for number in [number for number in self._bodies if number not in names]:
@@ -126,14 +126,14 @@ class RayScene:
         return shape
 
     def _triangles(self, geometry: specs.Box | specs.Cylinder | specs.Sphere | specs.Mesh) -> Path:
-        """Writes the surface of a shape to a file."""
+        """Writes the surface of a shape to a mesh file."""
         import trimesh
 
         match geometry:
             case specs.Box(size=size):
                 mesh = trimesh.creation.box(size)
             case specs.Cylinder(radius=radius, length=length):
-                mesh = trimesh.creation.cylinder(radius, length, sections=_SECTIONS)
+                mesh = trimesh.creation.cylinder(radius, length, sections=_CYLINDER_SIDES)
             case specs.Sphere(radius=radius):
                 mesh = trimesh.creation.icosphere(_SUBDIVISIONS, radius)
             case specs.Mesh():
@@ -145,7 +145,7 @@ class RayScene:
         return file
 
     def close(self) -> None:
-        """Frees the engine; may be called twice."""
+        """Closes the engine; may be called twice."""
         if self._client >= 0:
             self._api.disconnect(physicsClientId=self._client)
             self._client = -1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws what cameras see with PyBullet's renderers, in an engine of its own in which nothing moves by itself."""
+"""Renders camera images with PyBullet in a separate engine without physics."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from modular_framework_urdf.rotations import rotate_vector
 _PLANE_THICKNESS_M = 1e-3
 
 _TINY_SHIFT = (-0.5, 0.5)
-"""Shift of TinyRenderer's images, right and down [pixel]: it samples pixels at a corner, not at their centre."""
+"""Shift of TinyRenderer's images to the right and down [pixel]; TinyRenderer samples pixels at a corner."""
 
 _OPENGL_IN_OPTICAL = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-"""OpenGL's camera looks along -z, with y upwards."""
+"""Pose of OpenGL's camera frame in the optical frame; OpenGL's camera looks along -z, with y up."""
 
 
 class Drawing(Enum):
-    """PyBullet's ways to draw without a window."""
+    """Renderers of PyBullet that work without a window."""
 
-    EGL = "opengl"  # through EGL, also without a graphics card
-    TINY = "tiny"  # TinyRenderer, on the processor
+    EGL = "opengl"  # OpenGL through EGL, also without a graphics card
+    TINY = "tiny"  # TinyRenderer on the CPU
 
 
 class Renderer:
-    """Visual shapes at their poses, and images of them.
+    """Renders visual shapes at their poses.
 
     Args:
-        drawing: How to draw.
-        meshes: Converts mesh files and pictures.
-        log: Takes lines of text about shapes that cannot be drawn.
+        drawing: Renderer of PyBullet.
+        meshes: Converter of mesh files and textures.
+        log: Function that logs a shape that cannot be drawn.
 
     Raises:
-        SimulationError: This machine cannot draw that way.
+        SimulationError: The renderer does not work on this machine.
     """
 
     def __init__(self, drawing: Drawing, meshes: VisualMeshes, log: Callable[[str], None]) -> None:
@@ -60,13 +60,13 @@ class Renderer:
     def _load_egl(self) -> None:
         plugin = importlib.util.find_spec("eglRenderer")
         if plugin is None or plugin.origin is None:
-            raise SimulationError("PyBullet was built without its EGL renderer; use TinyRenderer")
+            raise SimulationError("PyBullet was built without the EGL renderer; use TinyRenderer")
         if self._api.loadPlugin(plugin.origin, "_eglRendererPlugin", physicsClientId=self._client) < 0:
-            raise SimulationError("PyBullet's EGL renderer cannot be loaded here; use TinyRenderer")
+            raise SimulationError("PyBullet cannot load the EGL renderer on this machine; use TinyRenderer")
         self._flag, self._shift = self._api.ER_BULLET_HARDWARE_OPENGL, (0.0, 0.0)
 
     def apply(self, update: SceneUpdate) -> None:
-        """Brings the shapes in step with the world."""
+        """Applies the changes of an update to the shapes."""
         for number in update.removed:
             for link in self._bodies.pop(number):
                 for body, _ in link:
@@ -75,8 +75,8 @@ class Renderer:
         for number, links in update.added.items():
             self._bodies[number] = tuple(tuple(self._add(link)) for link in links)
         for number, poses in update.poses.items():
-            before = self._poses.get(number, (None,) * len(poses))
-            for link, pose, old in zip(self._bodies[number], poses, before, strict=True):
+            old_poses = self._poses.get(number, (None,) * len(poses))
+            for link, pose, old in zip(self._bodies[number], poses, old_poses, strict=True):
                 if pose != old:
                     self._place(link, pose)
             self._poses[number] = poses
@@ -92,22 +92,23 @@ class Renderer:
         bodies = []
         for visual in visuals:
             try:
-                for options, colour, shift in self._shapes(visual):
+                for options, colour, part_pose in self._shapes(visual):
                     shape = self._api.createVisualShape(
                         **options, rgbaColor=colour, specularColor=(0.1, 0.1, 0.1), physicsClientId=self._client
                     )
                     body = self._api.createMultiBody(0, -1, shape, physicsClientId=self._client)
-                    bodies.append((body, visual.pose @ shift))
+                    bodies.append((body, visual.pose @ part_pose))
             except (DescriptionError, self._api.error) as error:
                 self._log(f"the visual '{visual.name}' is not drawn: {error}")
         return bodies
 
     def _shapes(self, visual: specs.Visual) -> list[tuple[dict[str, Any], specs.Colour, Pose]]:
-        """Returns the engine's options for the parts of a visual, with their colours and poses."""
+        """Returns the engine's options, the colour and the pose of each part of a visual."""
         geometry = visual.geometry
-        if visual.texture is None and not isinstance(geometry, specs.Mesh | specs.Sphere):  # the engine's are coarse
-            options, shift = self._shape(geometry)
-            return [(options, visual.colour, shift)]
+        # The engine's own spheres are too coarse.
+        if visual.texture is None and not isinstance(geometry, specs.Mesh | specs.Sphere):
+            options, part_pose = self._shape(geometry)
+            return [(options, visual.colour, part_pose)]
         parts = self._meshes.parts(visual)
         mesh = self._api.GEOM_MESH
         return [({"shapeType": mesh, "fileName": str(part.file)}, part.colour, Pose()) for part in parts]
@@ -121,17 +122,17 @@ class Renderer:
                 return {"shapeType": api.GEOM_CYLINDER, "radius": radius, "length": length}, Pose()
             case specs.Plane(normal=normal, size=(x, y)):
                 half = _PLANE_THICKNESS_M / 2
-                turn = _rotation_from_z(normal)
+                rotation = _rotation_from_z(normal)
                 nx, ny, nz = normal
-                shift = Pose((-nx * half, -ny * half, -nz * half), turn)
-                return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, half)}, shift
+                part_pose = Pose((-nx * half, -ny * half, -nz * half), rotation)
+                return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, half)}, part_pose
 
     def image(self, pinhole: Pinhole, optical_in_world: Pose) -> CameraImage:
-        """Draws what a camera sees.
+        """Renders the image of a camera.
 
         Args:
-            pinhole: The geometry of the image.
-            optical_in_world: Where the camera is.
+            pinhole: Projection of the image.
+            optical_in_world: Pose of the optical frame in the world frame.
         """
         _, _, rgba, buffer, _ = self._api.getCameraImage(
             pinhole.width,
@@ -148,14 +149,14 @@ class Renderer:
         return CameraImage(rgb, pinhole.depth_from_buffer(np.asarray(buffer, np.float32).reshape(size)))
 
     def close(self) -> None:
-        """Frees the engine; may be called twice."""
+        """Closes the engine; may be called twice."""
         if self._client >= 0:
             self._api.disconnect(physicsClientId=self._client)
             self._client = -1
 
 
 def _rotation_from_z(normal: tuple[float, float, float]) -> tuple[float, float, float, float]:
-    """Returns the shortest rotation that turns the z axis to a unit vector."""
+    """Returns the shortest rotation from the z axis to a unit vector, as a quaternion xyzw."""
     x, y, z = normal
     if z < -1 + 1e-9:
         return (1.0, 0.0, 0.0, 0.0)
@@ -164,7 +165,7 @@ def _rotation_from_z(normal: tuple[float, float, float]) -> tuple[float, float, 
 
 
 def _view_matrix(optical_in_world: Pose) -> list[float]:
-    """Returns OpenGL's view matrix, column by column."""
+    """Returns OpenGL's view matrix in column-major order."""
     world_in_camera = (optical_in_world @ _OPENGL_IN_OPTICAL).inverse()
     columns = [rotate_vector(world_in_camera.quaternion, axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     return [value for column in columns for value in (*column, 0.0)] + [*world_in_camera.position, 1.0]

@@ -16,36 +16,41 @@ from modular_framework_urdf.xml_text import Element
 
 Colour = tuple[float, float, float, float]
 
-_PLAIN: Colour = (0.7, 0.7, 0.7, 1.0)
-"""Of shapes without a material."""
+_DEFAULT_COLOUR: Colour = (0.7, 0.7, 0.7, 1.0)
+"""Colour of shapes without a material."""
 
 
 def read_robot_visuals(
     text: str, find_package: PackageFinder, log: Callable[[str], None]
 ) -> dict[str, tuple[specs.Visual, ...]]:
-    """Reads the visual shapes of every link that has some, by its name.
+    """Reads the visual shapes of all links with visual shapes, by link name.
 
     Args:
-        text: URDF that the simulation has read before.
-        find_package: Looks up the packages of package:// URIs.
-        log: Takes a line about a shape that is left out or drawn in another colour.
+        text: URDF that the simulation has accepted.
+        find_package: Function that finds the packages of package:// URIs.
+        log: Function that logs a shape that is omitted or drawn in another colour.
     """
     root, robot = xml_text.parse(text, "robot_description"), read_urdf(text)
-    named = {each.get("name", ""): each for each in root.findall("material") if each.find("color") is not None}
+    named_materials = {
+        each.get("name", ""): each for each in root.findall("material") if each.find("color") is not None
+    }
     visuals: dict[str, tuple[specs.Visual, ...]] = {}
     for element, link in zip(root.findall("link"), robot.links, strict=True):
         shapes = []
-        for number, (drawn, placed) in enumerate(zip(element.findall("visual"), link.visuals, strict=True)):
-            pose = Pose.from_xyz_rpy(placed.origin.xyz, placed.origin.rpy)
-            for shape in placed.shapes:
+        for index, (visual_element, visual) in enumerate(zip(element.findall("visual"), link.visuals, strict=True)):
+            pose = Pose.from_xyz_rpy(visual.origin.xyz, visual.origin.rpy)
+            for shape in visual.shapes:
                 try:
                     geometry = _geometry(shape, find_package)
                 except MeshError as error:
-                    log(f"robot_description:{placed.line}: a visual of link '{link.name}' is not drawn: {error}")
+                    log(f"robot_description:{visual.line}: a visual of link '{link.name}' is not drawn: {error}")
                     continue
-                name = f"{link.name}_{number}"
-                colour, plain = _colour(drawn, named, link.name, log), drawn.find("material") is None
-                shapes.append(specs.Visual(name, pose, geometry, colour, own_materials=plain))
+                name = f"{link.name}_{index}"
+                colour, without_material = (
+                    _colour(visual_element, named_materials, link.name, log),
+                    visual_element.find("material") is None,
+                )
+                shapes.append(specs.Visual(name, pose, geometry, colour, own_materials=without_material))
         if shapes:
             visuals[link.name] = tuple(shapes)
     return visuals
@@ -59,19 +64,19 @@ def _geometry(shape: Shape, find_package: PackageFinder) -> specs.Geometry:
     raise MeshError(f"<{shape.tag}>", "is not drawn by cameras", "allowed: box, cylinder, sphere or mesh")
 
 
-def _colour(visual: Element, named: dict[str, Element], link: str, log: Callable[[str], None]) -> Colour:
+def _colour(visual: Element, named_materials: dict[str, Element], link: str, log: Callable[[str], None]) -> Colour:
     material = visual.find("material")
     if material is None:
-        return _PLAIN
+        return _DEFAULT_COLOUR
     if material.find("color") is None:
-        material = named.get(material.get("name", ""))
+        material = named_materials.get(material.get("name", ""))
         if material is None:
-            return _PLAIN
+            return _DEFAULT_COLOUR
     text = material.find("color").get("rgba", "")
     try:
         red, green, blue, alpha = (float(word) for word in text.split())
     except ValueError:
         where = f"robot_description:{material.sourceline}: <material> of link '{link}'"
         log(f"{where}: got rgba='{text}'; expected four numbers from 0 to 1; drawn grey")
-        return _PLAIN
+        return _DEFAULT_COLOUR
     return red, green, blue, alpha

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The visible scene as JSON: what its models look like, and where their links are, for viewers in other processes."""
+"""Serializes the visible scene as JSON for viewers in other processes: visual shapes and link poses."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ LinkPoses = tuple[Pose, ...]
 
 @dataclass(frozen=True, slots=True)
 class VisibleLink:
-    """A link that can be seen.
+    """A link with visual shapes.
 
     Attributes:
-        name: Of the link.
-        visuals: Its visual shapes.
+        name: Name of the link.
+        visuals: Visual shapes of the link.
     """
 
     name: str
@@ -32,12 +32,12 @@ class VisibleLink:
 
 @dataclass(frozen=True, slots=True)
 class VisibleModel:
-    """A model that can be seen.
+    """A model with visual shapes.
 
     Attributes:
-        number: Of the model: another one that is spawned later under the same name has another number.
-        name: Instance name.
-        links: Those with visual shapes.
+        number: Unique number of the model; a model that is spawned later under the same name has another number.
+        name: Name of the model in the world.
+        links: Links with visual shapes.
     """
 
     number: int
@@ -47,12 +47,12 @@ class VisibleModel:
 
 @dataclass(frozen=True, slots=True)
 class ScenePoses:
-    """Where everything is at one instant.
+    """Poses of all visible links at one time.
 
     Attributes:
         time_ns: Simulated time [ns].
-        paused: Whether time is paused.
-        poses: Poses of the links in the world, in the order of `VisibleModel.links`, by the number of the model.
+        paused: Whether simulated time is paused.
+        poses: Link poses in the world frame, in the order of `VisibleModel.links`, by model number.
     """
 
     time_ns: int
@@ -61,7 +61,7 @@ class ScenePoses:
 
 
 def models_to_text(models: Sequence[VisibleModel]) -> str:
-    """Returns what models look like as JSON; `models_from_text` reads it."""
+    """Serializes the visual shapes of models as JSON for `models_from_text`."""
     records = [
         {
             "number": model.number,
@@ -77,10 +77,10 @@ def models_to_text(models: Sequence[VisibleModel]) -> str:
 
 
 def models_from_text(text: str) -> tuple[VisibleModel, ...]:
-    """Returns the models that `models_to_text` wrote.
+    """Parses the output of `models_to_text`.
 
     Raises:
-        ValueError: The text is something else.
+        ValueError: The text is not a list of visible models.
     """
     try:
         return tuple(
@@ -95,11 +95,11 @@ def models_from_text(text: str) -> tuple[VisibleModel, ...]:
             for model in orjson.loads(text)
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"no list of visible models ({type(error).__name__}: {error})") from None
+        raise ValueError(f"not a list of visible models ({type(error).__name__}: {error})") from None
 
 
 def poses_to_text(poses: ScenePoses) -> str:
-    """Returns poses as JSON, each as x, y, z [m] and a quaternion xyzw; `poses_from_text` reads it."""
+    """Serializes link poses as JSON for `poses_from_text`, each pose as x, y, z [m] and a quaternion xyzw."""
     record = {
         "time_ns": poses.time_ns,
         "paused": poses.paused,
@@ -109,17 +109,17 @@ def poses_to_text(poses: ScenePoses) -> str:
 
 
 def poses_from_text(text: str) -> ScenePoses:
-    """Returns the poses that `poses_to_text` wrote.
+    """Parses the output of `poses_to_text`.
 
     Raises:
-        ValueError: The text is something else.
+        ValueError: The text does not contain poses of visible models.
     """
     try:
         record = orjson.loads(text)
         poses = {int(number): tuple(map(_pose_from, links)) for number, links in record["poses"].items()}
         return ScenePoses(int(record["time_ns"]), bool(record["paused"]), poses)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"no poses of visible models ({type(error).__name__}: {error})") from None
+        raise ValueError(f"not the poses of visible models ({type(error).__name__}: {error})") from None
 
 
 def _pose_record(pose: Pose) -> tuple[float, ...]:
@@ -174,7 +174,7 @@ def _geometry_record(geometry: specs.Geometry) -> dict[str, Any]:
             return {"shape": "plane", "normal": normal, "size": size}
         case specs.Mesh(path=path, scale=scale, submesh=submesh, center=center):
             return {"shape": "mesh", "path": str(path), "scale": scale, "submesh": submesh, "center": center}
-    raise TypeError(f"{type(geometry).__name__} is no geometry")
+    raise TypeError(f"{type(geometry).__name__} is not a geometry")
 
 
 def _geometry_from(record: Mapping[str, Any]) -> specs.Geometry:
@@ -192,7 +192,7 @@ def _geometry_from(record: Mapping[str, Any]) -> specs.Geometry:
             scale = _vector(record["scale"])
             return specs.Mesh(Path(record["path"]), scale, str(record["submesh"]), bool(record["center"]))
         case shape:
-            raise ValueError(f"shape '{shape}' is unknown; allowed: box, cylinder, sphere, plane, mesh")
+            raise ValueError(f"unknown shape '{shape}'; allowed: box, cylinder, sphere, plane, mesh")
 
 
 def _vector(values: Sequence[float]) -> tuple[float, float, float]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the sensors of models and robots; what cannot be used is named, once, with what is known."""
+"""Reads the sensors of models and robots, and reports each unsupported element once with the allowed values."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ _SENSOR_PLUGINS = {
     **dict.fromkeys(contact.TYPES, contact.PLUGINS),
     **dict.fromkeys(force_torque.TYPES, ()),
 }
-"""The plugins that a <sensor> of each type may have."""
+"""Allowed plugins of a <sensor>, by sensor type."""
 _MODEL_PLUGINS = (*imu.MODEL_PLUGINS, *force_torque.PLUGINS)
-"""The plugins of a model that are sensors."""
-_NAMESPACE_OF_ROBOTS = "/"
-"""With which spawn_model spawns them."""
-_DONE_OTHERWISE = ("gazebo_ros_control", "gz_ros2_control-system", "gazebo_ros2_control")
-"""Plugins of a model whose work this simulation does without them."""
+"""Plugins of a model that are sensors."""
+_ROBOT_NAMESPACE = "/"
+"""Namespace that spawn_model assigns to robots."""
+_REPLACED_PLUGINS = ("gazebo_ros_control", "gz_ros2_control-system", "gazebo_ros2_control")
+"""Plugins of a model that this simulation replaces."""
 
 
 @dataclass(slots=True)
 class Sensors:
-    """The sensors of one model.
+    """Sensors of a model.
 
     Attributes:
-        parts: What the model has that they can be in.
-        found: Those that can be simulated.
-        faults: One sentence for each of the others, by what is wrong: the same fault is named once.
+        parts: Links and joints of the model.
+        found: Supported sensors.
+        faults: One sentence per fault, keyed by the fault, so that each fault is reported once.
     """
 
     parts: ModelParts
@@ -61,8 +61,8 @@ def read_model_sensors(model: Model, seed: int = 0) -> Sensors:
     """Reads the sensors of a model.
 
     Args:
-        model: Its description, under its name in the world.
-        seed: Of the simulation, for noise.
+        model: Description of the model, with its name in the world.
+        seed: Random seed of the simulation, for noise.
     """
     links = {link.name: link.collisions for link in model.links}
     joints = {joint.name: JointPart(joint.parent, joint.child, joint.kind.value) for joint in model.joints}
@@ -73,10 +73,10 @@ def read_robot_sensors(text: str, robot: str, find_package: PackageFinder, seed:
     """Reads the sensors of a robot.
 
     Args:
-        text: URDF that the simulation has read before.
+        text: URDF that the simulation has accepted.
         robot: Name of the robot in the world.
-        find_package: Looks up the packages of package:// URIs.
-        seed: Of the simulation, for noise.
+        find_package: Function that finds the packages of package:// URIs.
+        seed: Random seed of the simulation, for noise.
     """
     root, description = parse_xml(text, "robot_description"), read_urdf(text)
     links: dict[str, tuple[specs.Collision, ...]] = {}
@@ -84,30 +84,30 @@ def read_robot_sensors(text: str, robot: str, find_package: PackageFinder, seed:
         collisions = zip(element.find_all("collision"), link.collisions, strict=True)
         links[link.name] = tuple(
             specs.Collision(
-                collision_name(node.attributes.get("name", ""), link.name, number),
-                Pose.from_xyz_rpy(placed.origin.xyz, placed.origin.rpy),
+                collision_name(node.attributes.get("name", ""), link.name, index),
+                Pose.from_xyz_rpy(collision.origin.xyz, collision.origin.rpy),
                 shape,
                 specs.Friction(),
             )
-            for number, (node, placed) in enumerate(collisions)
-            for shape in _geometries(placed.shapes, find_package)
+            for index, (node, collision) in enumerate(collisions)
+            for shape in _geometries(collision.shapes, find_package)
         )
     joints = {joint.name: JointPart(joint.parent, joint.child, joint.kind) for joint in description.joints}
-    return _read(ModelParts(robot, links, joints, _NAMESPACE_OF_ROBOTS), urdf_sensor_elements(root), seed)
+    return _read(ModelParts(robot, links, joints, _ROBOT_NAMESPACE), urdf_sensor_elements(root), seed)
 
 
 def _geometries(shapes: Iterable[Shape], find_package: PackageFinder) -> list[specs.Geometry]:
-    """Returns the shapes that the simulation knows; a capsule as the cylinder around it."""
-    known: list[specs.Geometry] = []
+    """Returns the supported shapes; an enclosing cylinder replaces a capsule."""
+    geometries: list[specs.Geometry] = []
     for shape in shapes:
         match shape:
             case specs.Box() | specs.Cylinder() | specs.Sphere():
-                known.append(shape)
+                geometries.append(shape)
             case Capsule(radius=radius, length=length):
-                known.append(specs.Cylinder(radius, length + 2 * radius))
+                geometries.append(specs.Cylinder(radius, length + 2 * radius))
             case MeshFile(uri=uri, scale=scale):
-                known.append(specs.Mesh(mesh_path(uri, find_package), scale))
-    return known
+                geometries.append(specs.Mesh(mesh_path(uri, find_package), scale))
+    return geometries
 
 
 def _read(parts: ModelParts, elements: Iterable[SensorElement], seed: int) -> Sensors:
@@ -121,27 +121,27 @@ def _read(parts: ModelParts, elements: Iterable[SensorElement], seed: int) -> Se
             sensors.found.append(_reader(node, xml, seed)(xml))
         except ValueError as error:
             line = f"{node.where}: {error}; this {node.tag} is not simulated"
-            sensors.faults.setdefault(_kind(node, str(error)), line)
+            sensors.faults.setdefault(_fault_key(node, str(error)), line)
             continue
         unread = xml.sensor.unread() if xml.sensor is not xml.plugin else []
         unread += [f"plugin/{path}" for path in (xml.plugin.unread() if xml.plugin is not None else [])]
         if unread:
-            line = f"{node.where}: without effect here: {', '.join(unread)}"
-            sensors.faults.setdefault(_kind(node, line.partition(": without")[2]), line)
+            line = f"{node.where}: elements without effect: {', '.join(unread)}"
+            sensors.faults.setdefault(_fault_key(node, line.partition(": elements")[2]), line)
     return sensors
 
 
-def _kind(node: XmlNode, fault: str) -> str:
-    """Returns what identifies a fault: models that are spawned many times have it once."""
+def _fault_key(node: XmlNode, fault: str) -> str:
+    """Returns the key of a fault, which is the same for models that are spawned repeatedly."""
     return fault if node.tag == "plugin" else f"{node.attributes.get('name', '')}: {fault}"
 
 
 def _xml(parts: ModelParts, element: SensorElement) -> SensorXml | None:
-    """Returns an element with its plugin; None for a plugin whose work is done otherwise."""
+    """Returns an element with its plugin; None for a plugin that this simulation replaces."""
     reader = ElementReader(element.node)
     if element.node.tag == "plugin":
         file = _file(element.node)
-        if file in _DONE_OTHERWISE:
+        if file in _REPLACED_PLUGINS:
             return None
         return SensorXml(parts, element.scope, reader, reader, file, "", "", Pose())
     for key in ("always_on", "update_rate", "topic"):
@@ -150,19 +150,18 @@ def _xml(parts: ModelParts, element: SensorElement) -> SensorXml | None:
     plugin = element.node.find("plugin")
     if not element.link:
         raise ValueError(
-            f"<gazebo reference='{element.reference}'>: there is no such link; name one of the robot: "
-            f"{', '.join(parts.links)}"
+            f"<gazebo reference='{element.reference}'>: the robot has no such link; allowed: {', '.join(parts.links)}"
         )
-    of_plugin = ElementReader(plugin) if plugin is not None else None
-    if of_plugin is not None:
-        of_plugin.find("alwaysOn")
+    plugin_reader = ElementReader(plugin) if plugin is not None else None
+    if plugin_reader is not None:
+        plugin_reader.find("alwaysOn")
     file = _file(plugin) if plugin is not None else ""
     pose = element.pose if element.pose is not None else reader.pose("pose")
-    return SensorXml(parts, element.scope, reader, of_plugin, file, element.link, element.joint, pose)
+    return SensorXml(parts, element.scope, reader, plugin_reader, file, element.link, element.joint, pose)
 
 
 def _file(plugin: XmlNode) -> str:
-    """Returns the file name of a plugin without lib and .so."""
+    """Returns the file name of a plugin without "lib" and ".so"."""
     return plugin.attributes.get("filename", "").rpartition("/")[2].removeprefix("lib").removesuffix(".so")
 
 
@@ -175,10 +174,15 @@ def _files(plugins: Iterable[str]) -> str:
 
 
 def _reader(node: XmlNode, xml: SensorXml, seed: int) -> Callable[[SensorXml], AnySensor]:
-    """Returns what reads an element.
+    """Returns the function that reads an element.
+
+    Args:
+        node: The <sensor> or <plugin> element.
+        xml: The element with its plugin.
+        seed: Random seed of the simulation, for noise.
 
     Raises:
-        ValueError: Nothing does.
+        ValueError: The sensor type or plugin is not supported.
     """
     if node.tag == "plugin":
         if xml.file not in _MODEL_PLUGINS:

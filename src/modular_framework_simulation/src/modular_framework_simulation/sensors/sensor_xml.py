@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the readers of all kinds of sensors share: the element, its plugin, and names as gazebo_plugins makes them."""
+"""Elements, plugins and names of sensors, shared by the readers of all sensor types.
+
+Names follow the rules of gazebo_plugins.
+"""
 
 from __future__ import annotations
 
@@ -11,25 +14,25 @@ from modular_framework_simulation.models.sdf_specs import Collision
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.sensors.element_reader import ElementReader
 
-_WITHOUT_TOPIC = "__default_topic__"
+_NO_TOPIC = "__default_topic__"
 
 
 LinkShapes = Mapping[str, tuple[Collision, ...]]
-"""Collision shapes by the name of their link."""
+"""Collision shapes, by link name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What all sensors have.
+    """Properties of all sensors.
 
     Attributes:
-        name: model::link::sensor; differs from sensor to sensor.
-        model: Instance name of the model it belongs to.
-        link: Name of the link it is fastened to.
-        pose: In the frame of the link.
-        topic: Where its measurements are published.
-        frame_id: For the headers of its messages.
-        rate_hz: Measurements in a second of simulated time; 0: one in every physics step.
+        name: Unique name, model::link::sensor.
+        model: Name of the model in the world.
+        link: Name of the link that the sensor is fixed to.
+        pose: Pose of the sensor in the link frame.
+        topic: Topic of the measurements.
+        frame_id: Frame in message headers.
+        rate_hz: Measurements per second of simulated time [Hz]; 0 for every physics step.
     """
 
     name: str
@@ -42,18 +45,18 @@ class Sensor:
 
     @property
     def parent(self) -> str:
-        """The link it is fastened to: model::link."""
+        """Returns the link that the sensor is fixed to, as model::link."""
         return f"{self.model}{SCOPE}{self.link}"
 
 
 @dataclass(frozen=True, slots=True)
 class JointPart:
-    """A joint of a model with a sensor.
+    """Joint of a model with sensors.
 
     Attributes:
-        parent: The link that carries it, or "world".
-        child: The link it carries.
-        kind: Its type, as in the description.
+        parent: Name of the parent link, or "world".
+        child: Name of the child link.
+        kind: Joint type in the description.
     """
 
     parent: str
@@ -63,13 +66,13 @@ class JointPart:
 
 @dataclass(frozen=True, slots=True)
 class ModelParts:
-    """What a model has that sensors can be in.
+    """Parts of a model that sensors refer to.
 
     Attributes:
-        name: Instance name.
-        links: Collision shapes of every link, by its name.
-        joints: By name.
-        namespace: Of its topics, where the description names none.
+        name: Name of the model in the world.
+        links: Collision shapes, by link name.
+        joints: Joints, by joint name.
+        namespace: Default namespace of the sensors' topics.
     """
 
     name: str
@@ -80,17 +83,17 @@ class ModelParts:
 
 @dataclass(frozen=True, slots=True)
 class SensorXml:
-    """One sensor as its file has it.
+    """Sensor element of a description.
 
     Attributes:
-        model: The model it is in.
-        scope: "inner::" for one in an inner model, which names stand below.
-        sensor: The <sensor>; for a <plugin> of the model that one.
-        plugin: The <plugin>; None where there is none.
-        file: File name of the plugin, without lib and .so.
-        link: The link it is in; empty for a <plugin> of the model.
-        joint: The joint it is in; mostly empty.
-        pose: In the frame of the link.
+        model: Model of the sensor.
+        scope: Prefix "inner::" of names in an inner model; empty for the outer model.
+        sensor: The <sensor>; for a plugin of the model, the <plugin>.
+        plugin: The <plugin>; None for a sensor without a plugin.
+        file: File name of the plugin without "lib" and ".so".
+        link: Name of the sensor's link; empty for a plugin of the model.
+        joint: Name of the sensor's joint; empty for a sensor of a link.
+        pose: Pose of the sensor in the link frame.
     """
 
     model: ModelParts
@@ -104,7 +107,7 @@ class SensorXml:
 
     @property
     def name(self) -> str:
-        """The full name: model::link::sensor."""
+        """Returns the full name, model::link::sensor."""
         own = self.sensor.node.attributes.get("name", "")
         return SCOPE.join(part for part in (self.model.name, self.link, own) if part)
 
@@ -112,45 +115,45 @@ class SensorXml:
         """Returns the <topic> of a sensor without a plugin.
 
         Args:
-            plugins: Those that could be there, for the message.
+            plugins: Names of the possible plugins for the message.
 
         Raises:
-            ValueError: There is none, so that nothing would be published.
+            ValueError: The sensor has no <topic>, so its measurements would not be published.
         """
         topic = self.sensor.text("topic")
-        if topic in ("", _WITHOUT_TOPIC):
-            raise ValueError(f"nothing publishes it; add a <plugin> ({plugins}) or a <topic>")
+        if topic in ("", _NO_TOPIC):
+            raise ValueError(f"has no topic; add a <plugin> ({plugins}) or a <topic>")
         return resolved(self.model.namespace, topic)
 
     def namespace(self) -> str:
-        """Returns the <robotNamespace> of the plugin; that of the model where it has none."""
+        """Returns the plugin's <robotNamespace>; by default, the model's namespace."""
         return self.plugin.text("robotNamespace") or self.model.namespace if self.plugin else self.model.namespace
 
     def require_link(self, key: str) -> str:
-        """Returns the link that a key of the plugin names; by default the one it is in.
+        """Returns the link that an element of the plugin names; by default, the sensor's link.
 
         Raises:
-            ValueError: The model has no such link.
+            ValueError: The model has no link of this name.
         """
-        given = self.plugin.text(key) if self.plugin is not None else ""
-        link = f"{self.scope}{given.rpartition(SCOPE)[2]}" if given else self.link
+        name = self.plugin.text(key) if self.plugin is not None else ""
+        link = f"{self.scope}{name.rpartition(SCOPE)[2]}" if name else self.link
         if link not in self.model.links:
-            raise ValueError(f"<{key}>: got '{given}'; allowed: a link of the model: {', '.join(self.model.links)}")
+            raise ValueError(f"<{key}>: got '{name}'; allowed: a link of the model: {', '.join(self.model.links)}")
         return link
 
 
 def resolved(namespace: str, topic: str) -> str:
-    """Returns a topic below a namespace, unless it begins with "/"."""
+    """Returns the full name of a topic in a namespace; a name that starts with "/" is not changed."""
     base = namespace.rstrip("/")
     return topic if topic.startswith("/") or not base else f"{base}/{topic}"
 
 
 def prefixed(namespace: str, frame: str) -> str:
-    """Returns a frame with the namespace as its prefix, unless it begins with "/"; tf2 has no leading "/"."""
+    """Returns a frame with the namespace as prefix; a leading "/" prevents the prefix and is removed, as in tf2."""
     base = namespace.strip("/")
     return frame.lstrip("/") if frame.startswith("/") or not base else f"{base}/{frame}"
 
 
 def slower_of(first_hz: float, second_hz: float) -> float:
-    """Returns the lower of two rates, of which 0 means no bound."""
+    """Returns the lower of two rates [Hz]; 0 stands for no limit."""
     return min((rate for rate in (first_hz, second_hz) if rate), default=0.0)

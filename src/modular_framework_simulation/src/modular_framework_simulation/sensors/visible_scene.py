@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What cameras see: the visual shapes of all models, and where they are at one instant.
+"""Tracks the visual shapes of all models and their poses at one time, for cameras.
 
-The tracker looks at the world in the loop's thread and copies what changed; everything it returns can be sent to
-another process, which draws it while physics goes on.
+The tracker runs in the loop's thread and copies all changes. The copies are sent to the renderer's process, which draws
+while the physics continues.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.sensors.cameras import Camera
 
 LinkVisuals = Mapping[str, tuple[Visual, ...]]
-"""The visual shapes of a model by the name of their link."""
+"""Visual shapes of a model, by link name."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneUpdate:
-    """What changed since the last update, and which cameras are to look.
+    """Changes of the scene since the last update, and the poses of the cameras.
 
     Attributes:
         time_ns: Simulated time [ns].
-        added: Visual shapes of new models, by the number of the model: one tuple for each link.
-        removed: Numbers of the models that are gone.
-        poses: Poses of the links in the world, in the order of `added`, by the number of the model; models that cannot
-            have moved are left out.
-        cameras: Pose of the optical frame in the world, by the name of the camera.
+        added: Visual shapes of new models by model number, with one tuple per link.
+        removed: Numbers of removed models.
+        poses: Link poses in the world frame by model number, in the order of `added`; models that cannot have moved are
+            left out.
+        cameras: Poses of the optical frames in the world frame, by camera name.
     """
 
     time_ns: int
@@ -42,11 +42,11 @@ class SceneUpdate:
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """What the renderer answers.
+    """Response of the renderer.
 
     Attributes:
-        images: How many updates it has finished.
-        wanted: Names of the cameras that somebody subscribes to, with how many subscriptions there have been so far.
+        images: Number of finished updates.
+        wanted: Total number of subscriptions so far, by name of each camera with subscribers.
     """
 
     images: int
@@ -54,11 +54,11 @@ class SceneReport:
 
 
 class SceneTracker:
-    """Describes the world to a renderer, one update after the other.
+    """Describes the world to a renderer in successive updates.
 
     Args:
-        world: What is seen.
-        robots: Visual shapes of the robots, by their names: the world knows those of other models itself.
+        world: The world.
+        robots: Visual shapes of the robots by robot name; the world only stores the shapes of other models.
     """
 
     def __init__(self, world: PhysicsWorld, robots: Mapping[str, LinkVisuals]) -> None:
@@ -67,7 +67,7 @@ class SceneTracker:
         self._revision = -1
 
     def update(self, cameras: Sequence[Camera]) -> SceneUpdate:
-        """Returns what changed; cameras on something that is no longer there are left out."""
+        """Returns the changes since the last update; cameras on removed models are left out."""
         world = self._world
         names = {world.instance(name): name for name in world.names()}
         removed = tuple(number for number in self._links if number not in names)

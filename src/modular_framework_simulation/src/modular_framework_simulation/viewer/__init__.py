@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows world, robot, planning scene, plan and cameras in a browser; reads public topics and services only."""
+"""Viewer of world, robot, planning scene, plan and cameras in a browser, based on public topics and services."""

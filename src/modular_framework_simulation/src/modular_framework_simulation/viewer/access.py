@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Admits only requests that carry the viewer's address and token; any page in a local browser can send requests."""
+"""Only accepts requests with the viewer's address and token, because any page in a local browser can send requests."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from modular_framework_simulation.errors import SimulationError
 
 _HOSTNAME = socket.gethostname().lower()
 _LOCAL_NAMES = ("localhost", _HOSTNAME, f"{_HOSTNAME}.local")
-"""Names of this computer. A page whose own name was made to lead here (DNS rebinding) has another."""
+"""Names of this computer; a page that reaches this server through DNS rebinding uses another name."""
 
 
 class Access:
-    """Checks each HTTP request and WebSocket handshake before viser answers it.
+    """Checks each HTTP request and WebSocket handshake before viser handles it.
 
     Attributes:
         token: First part of every path; secret, and new at each start.
@@ -30,12 +30,12 @@ class Access:
         self.token = secrets.token_urlsafe(16)
 
     def refusal(self, path: str, host: str, origin: str | None, port: int) -> str:
-        """Returns why a request is refused; empty if it is admitted.
+        """Returns the reason for refusing a request; empty for an accepted request.
 
         Args:
-            path: Path of the request, with the query.
-            host: Its header Host.
-            origin: Its header Origin, which browsers add to every WebSocket handshake; None without.
+            path: Path of the request, including the query.
+            host: Header Host of the request.
+            origin: Header Origin, which browsers add to every WebSocket handshake; None if missing.
             port: Port of the server.
         """
         name, _, given_port = host.lower().rpartition(":")
@@ -49,10 +49,10 @@ class Access:
 
     @contextlib.contextmanager
     def enforced(self) -> Iterator[None]:
-        """Checks the requests of the server that viser starts in this context; viser itself has no option for checks.
+        """Makes the server that viser starts in this context check its requests, because viser has no such option.
 
         Raises:
-            SimulationError: viser started its server in an unknown manner, unchecked.
+            SimulationError: The version of viser is not supported, so its server is unchecked.
         """
         from websockets.asyncio import server
 
@@ -68,18 +68,18 @@ class Access:
         finally:
             server.serve = original  # type: ignore[misc]
         if not started:
-            raise SimulationError("this version of viser starts its server unchecked; install that of requirements.txt")
+            raise SimulationError("this viser version has an unchecked server; install the version in requirements.txt")
 
-    def _process(self, answer: Any, connection: Any, request: Any) -> Any:
-        """Answers a refused request, and passes an admitted one on without its token."""
+    def _process(self, handler: Any, connection: Any, request: Any) -> Any:
+        """Responds to a refused request, and forwards an accepted request without its token."""
         host, origins = ",".join(request.headers.get_all("Host")), request.headers.get_all("Origin")
         refusal = self.refusal(request.path, host, ",".join(origins) or None, connection.local_address[1])
         if refusal:
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{refusal}\n")
         request.path = request.path.removeprefix(f"/{self.token}") or "/"
-        response = answer(connection, request)
+        response = handler(connection, request)
         if response is not None:
-            response.headers["Referrer-Policy"] = "no-referrer"  # links of the page would give the token away
+            response.headers["Referrer-Policy"] = "no-referrer"  # links on the page would reveal the token
         return response
 
 

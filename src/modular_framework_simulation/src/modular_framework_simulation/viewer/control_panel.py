@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The panel beside the scene: time, layers, replay of the plan, and the image of a camera."""
+"""Control panel beside the scene, with time, layers, replay of the plan, and a camera image."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ _STEPS_S = {"1 step": 0.0, "0.1 s": 0.1, "1 s": 1.0}
 
 
 class CommandError(Exception):
-    """The simulation did not carry out a command; the text says why."""
+    """The simulation did not execute a command; the text gives the reason."""
 
 
 class Commands(Protocol):
-    """What the buttons do with the simulation; each raises CommandError where it fails."""
+    """Commands of the buttons to the simulation; a failed command raises CommandError."""
 
     def pause(self) -> None:
-        """Stops time."""
+        """Pauses time."""
 
     def unpause(self) -> None:
-        """Resumes time."""
+        """Unpauses time."""
 
     def step(self, duration_s: float) -> None:
-        """Stops time and lets a duration pass [s]; 0 is one physics step."""
+        """Pauses time and advances by a duration [s]; 0 for one physics step."""
 
     def reset_world(self) -> None:
-        """Puts models and robot where they started."""
+        """Resets the models and the robot to their initial poses."""
 
     def reset_simulation(self) -> None:
-        """Puts models and robot where they started, and time to 0."""
+        """Resets the models and the robot to their initial poses, and time to 0."""
 
     def set_real_time_factor(self, factor: float) -> None:
-        """Bounds simulated over real time; 0: as fast as possible."""
+        """Sets the maximum ratio of simulated to real time; 0 for as fast as possible."""
 
     def real_time_factor(self) -> float:
-        """Returns that bound."""
+        """Returns the maximum ratio of simulated to real time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What the panel says about time.
+    """Status of simulated time.
 
     Attributes:
         time_s: Simulated time [s]; None without a simulation.
-        paused: Whether it is paused.
-        factor: Simulated over real time, as measured.
+        paused: Whether time is paused.
+        factor: Measured ratio of simulated to real time.
     """
 
     time_s: float | None
@@ -61,19 +61,19 @@ class Status:
 
     def __str__(self) -> str:
         if self.time_s is None:
-            return "There is no simulation."
+            return "No simulation is running."
         state = "paused" if self.paused else f"real time factor {self.factor:.2f}"
         return f"Time {self.time_s:.2f} s, {state}"
 
 
 class ControlPanel:
-    """Buttons, switches and the image; its attributes are read by the thread that draws.
+    """Buttons, check boxes and camera image, whose state is read by the drawing thread.
 
     Args:
         server: The viser server.
-        commands: What the buttons do.
-        log: Takes a line about a command that failed.
-        read_only: Whether every command is refused and its button hidden.
+        commands: Commands of the buttons.
+        log: Function that logs a failed command.
+        read_only: Whether commands are refused and their buttons hidden.
     """
 
     def __init__(self, server: Any, commands: Commands, log: Callable[[str], None], *, read_only: bool = False) -> None:
@@ -87,12 +87,12 @@ class ControlPanel:
         with gui.add_folder("Show"):
             self._world = gui.add_checkbox("World", True)
             self._robot = gui.add_checkbox("Robot", True)
-            self._scene = gui.add_checkbox("Planning scene", False, hint="What move_group plans around")
+            self._scene = gui.add_checkbox("Planning scene", False, hint="Objects in move_group's planning scene")
             self._plan = gui.add_checkbox("Plan", True)
             self._grid = gui.add_checkbox("Grid", False)
             self._shadows = gui.add_checkbox("Shadows", True)
         with gui.add_folder("Plan"):
-            self._replay = gui.add_button("Replay", hint="Shows the motion planned last")
+            self._replay = gui.add_button("Replay", hint="Shows the latest planned motion")
             self._loop = gui.add_checkbox("Repeat", False)
             self._position = gui.add_slider("Position", 0.0, 1.0, 0.005, 0.0)
         with gui.add_folder("Camera"):
@@ -104,10 +104,10 @@ class ControlPanel:
         self._resumed = gui.add_button("Resume", visible=False)
         self._step = gui.add_button_group("Step", tuple(_STEPS_S))
         self._speed = gui.add_dropdown(
-            "Speed", _speeds(1.0), initial_value=_speed(1.0), hint="Bound of the real time factor"
+            "Speed", _speeds(1.0), initial_value=_speed(1.0), hint="Maximum real time factor"
         )
         self._known_speed = self._speed.value
-        reset = gui.add_button("Reset poses", hint="/gazebo/reset_world: time goes on")
+        reset = gui.add_button("Reset poses", hint="/gazebo/reset_world: time continues")
         reset_all = gui.add_button("Reset poses and time", hint="/gazebo/reset_simulation")
         commands = self._commands
         self._paused.on_click(lambda event: self._do(event, commands.pause))
@@ -125,7 +125,7 @@ class ControlPanel:
         except CommandError as error:
             self._log(str(error))
             if event.client is not None:
-                event.client.add_notification("Not done", str(error), auto_close_seconds=10.0)
+                event.client.add_notification("Command failed", str(error), auto_close_seconds=10.0)
 
     def _on_speed(self, event: Any) -> None:
         if self._speed.value != self._known_speed:
@@ -135,7 +135,7 @@ class ControlPanel:
             self._do(event, lambda: self._commands.set_real_time_factor(factor))
 
     def refresh_speed(self) -> None:
-        """Shows the bound of the real time factor as the simulation has it, where there is one."""
+        """Shows the simulation's maximum ratio of simulated to real time; does nothing without a simulation."""
         try:
             factor = self._commands.real_time_factor()
         except CommandError:
@@ -145,7 +145,7 @@ class ControlPanel:
         self._speed.value = self._known_speed
 
     def show_status(self, status: Status) -> None:
-        """Says what time it is."""
+        """Shows the status of simulated time."""
         if str(status) == self._shown_status:
             return
         self._shown_status = str(status)
@@ -159,7 +159,11 @@ class ControlPanel:
                 handle.visible = visible
 
     def shows(self, layer: str) -> bool:
-        """Whether a layer is to be shown: "world", "robot", "planning scene", "plan", "grid" or "shadows"."""
+        """Returns whether a layer is visible.
+
+        Args:
+            layer: "world", "robot", "planning scene", "plan", "grid" or "shadows".
+        """
         boxes = {
             "world": self._world,
             "robot": self._robot,
@@ -171,29 +175,29 @@ class ControlPanel:
         return bool(boxes[layer].value)
 
     def show_planning_scene(self) -> None:
-        """Switches the layer of the planning scene on."""
+        """Shows the layer of the planning scene."""
         self._scene.value = True
 
     def on_replay(self, action: Callable[[], None]) -> None:
-        """Has an action done when a replay is asked for."""
+        """Sets an action for the replay button."""
         self._replay.on_click(lambda _event: action())
 
     def on_position(self, action: Callable[[float], None]) -> None:
-        """Has an action done when a client moves the slider, with the share of the motion that has passed."""
+        """Sets an action for the position slider, which is called with the fraction of the motion."""
         self._position.on_update(lambda event: action(self._position.value) if event.client is not None else None)
 
     @property
     def repeats(self) -> bool:
-        """Whether a replay begins again at its end."""
+        """Returns whether a replay repeats."""
         return bool(self._loop.value)
 
     @property
     def camera(self) -> str:
-        """Topic of the image to be shown; empty for none."""
+        """Returns the topic of the displayed image; empty for none."""
         return "" if self._camera.value == NO_CAMERA else str(self._camera.value)
 
     def offer_cameras(self, topics: Sequence[str]) -> None:
-        """Offers topics with images; the chosen one stays, also when it is gone for a while."""
+        """Sets the selectable image topics; the selected topic remains selectable."""
         options = (NO_CAMERA, *sorted({*topics, *([self.camera] if self.camera else [])}))
         if tuple(self._camera.options) != options:
             chosen = self._camera.value
@@ -201,7 +205,7 @@ class ControlPanel:
             self._camera.value = chosen
 
     def show_image(self, picture: NDArray[np.uint8] | None) -> None:
-        """Shows an image, shape (height, width, 3); None: none."""
+        """Shows an image, shape (height, width, 3), or hides the image for None."""
         if picture is not None:
             self._image.image = picture
         if self._image.visible != (picture is not None):
@@ -212,6 +216,6 @@ def _speed(factor: float) -> str:
     return f"{factor:g}" if factor else AS_FAST_AS_POSSIBLE
 
 
-def _speeds(present: float) -> tuple[str, ...]:
-    """Returns the choices of the bound, the present one among them."""
-    return (*(_speed(factor) for factor in sorted({*_FACTORS, present} - {0.0})), AS_FAST_AS_POSSIBLE)
+def _speeds(current: float) -> tuple[str, ...]:
+    """Returns the selectable speeds, including the current speed."""
+    return (*(_speed(factor) for factor in sorted({*_FACTORS, current} - {0.0})), AS_FAST_AS_POSSIBLE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns visible shapes into binary glTF, which browsers draw."""
+"""Converts visible shapes to binary glTF for browsers."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from modular_framework_simulation.models.visual_meshes import drawn_bodies_of
 from modular_framework_urdf.rotations import rotate_vector
 
 _CREASE_RAD = math.radians(30)
-"""Faces that meet at a larger angle are drawn with a sharp edge."""
+"""Minimum angle between faces whose common edge is drawn sharp."""
 _GAMMA = 2.2
-"""Colours of descriptions are those of a screen; glTF's are linear in light."""
+"""Exponent of the conversion from screen colours in descriptions to linear colours in glTF."""
 _ROUGHNESS = 0.8
 
 PlacedBody = tuple[Pose, DrawnBody]
-"""A body and its pose in the link."""
+"""A body and its pose in the link frame."""
 
 
 def bodies_of_visuals(visuals: Sequence[Visual], log: Callable[[str], None]) -> list[PlacedBody]:
-    """Returns what the visual shapes of a link are drawn as; a line is logged about those that cannot be read."""
-    placed: list[PlacedBody] = []
+    """Returns the bodies of a link's visual shapes; shapes that cannot be read are logged."""
+    bodies: list[PlacedBody] = []
     for visual in visuals:
         try:
-            placed += [(visual.pose, body) for body in drawn_bodies_of(visual)]
+            bodies += [(visual.pose, body) for body in drawn_bodies_of(visual)]
         except DescriptionError as error:
             log(f"the visual '{visual.name}' is not drawn: {error}")
-    return placed
+    return bodies
 
 
 def glb_of(bodies: Iterable[PlacedBody], tint: Colour | None = None, outset_m: float = 0.0) -> bytes | None:
-    """Returns bodies as binary glTF; None where there are none.
+    """Converts bodies to binary glTF; returns None without bodies.
 
     Args:
-        bodies: What to draw.
-        tint: The colour of everything; None: as the bodies say.
-        outset_m: Distance by which surfaces are moved outwards [m], so that they are seen around others in the same
-            place; below 0 inwards, so that they are hidden there.
+        bodies: Bodies with their poses.
+        tint: Colour of all bodies; None for the bodies' own colours.
+        outset_m: Outward displacement of the surfaces [m]. A positive value makes them visible around other surfaces in
+            the same place, a negative value hides them.
     """
     import trimesh.exchange.gltf
 
@@ -61,7 +61,7 @@ def glb_of(bodies: Iterable[PlacedBody], tint: Colour | None = None, outset_m: f
 
 
 def pose_matrix(pose: Pose) -> NDArray[np.float64]:
-    """Returns a pose as a (4, 4) matrix."""
+    """Returns a pose as a homogeneous transform, shape (4, 4)."""
     matrix = np.eye(4)
     for column, axis in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
         matrix[:3, column] = rotate_vector(pose.quaternion, axis)
@@ -73,9 +73,9 @@ def _mesh(body: DrawnBody, tint: Colour | None, outset_m: float) -> Any:
     import trimesh
 
     visuals: Any = trimesh.visual
-    has_picture = tint is None and body.picture is not None and body.uv is not None
+    has_texture = tint is None and body.image is not None and body.uv is not None
     mesh: Any = trimesh.Trimesh(body.vertices, body.triangles, vertex_normals=body.normals, process=False)
-    if body.normals is None and not has_picture:
+    if body.normals is None and not has_texture:
         mesh.merge_vertices()
         mesh = trimesh.graph.smooth_shade(mesh, angle=_CREASE_RAD)
     if outset_m:
@@ -84,12 +84,12 @@ def _mesh(body: DrawnBody, tint: Colour | None, outset_m: float) -> Any:
     red, green, blue, alpha = tint or body.colour
     material = visuals.material.PBRMaterial(
         baseColorFactor=(*(min(max(c, 0.0), 1.0) ** _GAMMA for c in (red, green, blue)), min(max(alpha, 0.0), 1.0)),
-        baseColorTexture=body.picture if has_picture else None,
+        baseColorTexture=body.image if has_texture else None,
         alphaMode="BLEND" if alpha < 1.0 else "OPAQUE",
         metallicFactor=0.0,
         roughnessFactor=_ROUGHNESS,
-        doubleSided=not trimesh.Trimesh(body.vertices, body.triangles).is_volume,  # back faces of solids are never seen
+        doubleSided=not trimesh.Trimesh(body.vertices, body.triangles).is_volume,  # back faces of solids are hidden
     )
-    uv = body.uv[:, :2] if has_picture and body.uv is not None else None
+    uv = body.uv[:, :2] if has_texture and body.uv is not None else None
     mesh.visual = visuals.TextureVisuals(uv=uv, material=material)
     return mesh

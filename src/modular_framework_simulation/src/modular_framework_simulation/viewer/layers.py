@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Layers of the scene in the browser: groups of shapes that are shown and hidden together."""
+"""Layers of the scene in the browser, each a group of shapes that are shown and hidden together."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from typing import Any
 
 from modular_framework_simulation.models.poses import Pose
 
-_SAME_TRANSLATION_M, _SAME_ROTATION_RAD = 1e-5, 1e-4
-"""What moved less is not sent again."""
+_MIN_TRANSLATION_M, _MIN_ROTATION_RAD = 1e-5, 1e-4
+"""Minimum translation and rotation of a movement that is sent."""
 
 
 class Look(Enum):
-    """How a shape takes part in shadows; the value is how it shows those of others."""
+    """Role of a shape in shadows; the value is viser's setting for received shadows."""
 
     SOLID = True
-    """Casts shadows, and shows them as the light has it."""
+    """Shape that casts shadows, and receives shadows with the darkness of the light."""
     GROUND = 0.3
-    """Shows shadows so dark, and casts none: it would cast stripes on itself."""
+    """Shape that receives weak shadows and casts none, which would appear as stripes on its own surface."""
     GHOST = False
-    """Transparent: has nothing to do with them."""
+    """Transparent shape without shadows."""
 
 
 class Layer:
-    """Shapes below one node of the object tree.
+    """Shapes below a node of the scene tree.
 
     Args:
         server: The viser server.
-        name: Of the node.
-        visible: Whether it is shown at first.
+        name: Name of the node.
+        visible: Whether the layer is initially visible.
     """
 
     def __init__(self, server: Any, name: str, visible: bool = True) -> None:
@@ -41,7 +41,7 @@ class Layer:
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown."""
+        """Returns whether the layer is visible."""
         return bool(self._root.visible)
 
     @visible.setter
@@ -51,29 +51,29 @@ class Layer:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Which shapes there are."""
+        """Returns the paths of all shapes."""
         return tuple(self._nodes)
 
     def add(self, path: str, content: bytes | None, look: Look = Look.SOLID) -> None:
-        """Adds a shape, in the place of the one that has its path.
+        """Adds a shape, or replaces the shape with the same path.
 
         Args:
-            path: Names of a group and of the shape in it, with a slash between them; or only a name.
-            content: Binary glTF; None: nothing is seen of it.
-            look: How it takes part in shadows.
+            path: Name of the shape, or names of a group and a shape, separated by a slash.
+            content: Binary glTF; None for a shape that is not visible.
+            look: Role in shadows.
         """
         self.remove(path)
         if content is None:
             return
-        group, _, rest = path.partition("/")
-        if rest and group not in self._groups:
+        group, _, shape_name = path.partition("/")
+        if shape_name and group not in self._groups:
             self._groups[group] = self._server.scene.add_frame(f"/{self._name}/{group}", show_axes=False)
         self._nodes[path] = self._server.scene.add_glb(
             f"/{self._name}/{path}", content, cast_shadow=look is Look.SOLID, receive_shadow=look.value
         )
 
     def remove(self, path: str) -> None:
-        """Removes a shape, and its group if that is empty then; there may be none."""
+        """Removes a shape, and its group if that is empty; a missing shape is ignored."""
         node = self._nodes.pop(path, None)
         self._poses.pop(path, None)
         if node is None:
@@ -89,13 +89,13 @@ class Layer:
             self.remove(path)
 
     def place(self, path: str, pose: Pose) -> None:
-        """Puts a shape at a pose in the world; nothing where there is no such shape."""
-        node, before = self._nodes.get(path), self._poses.get(path)
+        """Moves a shape to a pose in the world frame; a missing shape is ignored."""
+        node, previous = self._nodes.get(path), self._poses.get(path)
         if node is None:
             return
-        if before is not None:
-            translation, rotation = before.distance_to(pose)
-            if translation < _SAME_TRANSLATION_M and rotation < _SAME_ROTATION_RAD:
+        if previous is not None:
+            translation, rotation = previous.distance_to(pose)
+            if translation < _MIN_TRANSLATION_M and rotation < _MIN_ROTATION_RAD:
                 return
         self._poses[path] = pose
         x, y, z, w = pose.quaternion
@@ -103,5 +103,5 @@ class Layer:
 
 
 def tree_name(name: str) -> str:
-    """Returns a name as one of the object tree, where a slash separates names."""
+    """Returns a name for the scene tree, in which a slash separates names."""
     return name.replace("/", "|") or "(no name)"

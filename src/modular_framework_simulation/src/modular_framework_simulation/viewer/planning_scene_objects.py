@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The objects of the planning scene, from the messages of `monitored_planning_scene`."""
+"""Tracks the objects of the planning scene in messages of `monitored_planning_scene`."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from modular_framework_simulation.models.sdf_specs import Colour
 from modular_framework_simulation.viewer.glb_files import PlacedBody
 
 FREE_COLOUR: Colour = (0.2, 0.8, 0.3, 0.3)
-"""Of an object of the world: green, as RViz has it, and transparent: it covers what is seen of the world."""
+"""Colour of an object of the world, green as in RViz; transparent, because the object covers its visual shape."""
 ATTACHED_COLOUR: Colour = (0.7, 0.3, 0.9, 0.55)
-"""Of an object that the robot holds."""
+"""Colour of an attached object."""
 _PLANE_SIZE_M = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """An object of the planning scene.
+    """Object of the planning scene.
 
     Attributes:
-        frame: The frame of the pose: a link of the robot, or the frame of the scene.
-        pose: Of the object in that frame.
-        bodies: Its shapes, in the frame of the object.
-        attached: Whether the robot holds it.
+        frame: Reference frame of the pose: a robot link, or the frame of the scene.
+        pose: Pose of the object in the reference frame.
+        bodies: Shapes of the object, in the object frame.
+        attached: Whether the object is attached to the robot.
     """
 
     frame: str
@@ -45,24 +45,24 @@ class SceneObject:
 
 
 class PlanningSceneObjects:
-    """Collects the objects; messages are moveit_msgs/PlanningScene, whole scenes or changes.
+    """Objects of the planning scene, updated by moveit_msgs/PlanningScene messages.
 
     Attributes:
-        objects: By name.
+        objects: Objects by name.
     """
 
     def __init__(self) -> None:
         self.objects: dict[str, SceneObject] = {}
 
     def apply(self, message: Any) -> list[str]:
-        """Takes a scene or a change of it.
+        """Applies a complete scene or a difference.
 
         Returns:
-            What is wrong with objects of the message; these are as before.
+            Faults of objects in the message; the objects of these names are not changed.
         """
         if not message.is_diff:
             self.objects.clear()
-        elif not message.robot_state.is_diff:  # a whole robot state: it names all that the robot holds
+        elif not message.robot_state.is_diff:  # a complete robot state contains all attached objects
             self._remove_attached()
         faults = []
         attached = message.robot_state.attached_collision_objects
@@ -91,11 +91,11 @@ class PlanningSceneObjects:
         pose, frame = _pose(item.pose), item.header.frame_id.lstrip("/") or link
         if item.operation == item.MOVE:
             if known is None:
-                raise ValueError("is moved and was never added")
+                raise ValueError("is moved, but does not exist")
             self.objects[item.id] = replace(known, pose=pose, frame=frame)
             return
         bodies = _bodies(item)
-        if link and not bodies and known is not None:  # attaches an object of the world as it is
+        if link and not bodies and known is not None:  # attaches an existing object of the world
             self.objects[item.id] = replace(known, attached=True)
             return
         if item.operation == item.APPEND and known is not None:
@@ -104,17 +104,17 @@ class PlanningSceneObjects:
 
 
 def _bodies(item: Any) -> tuple[PlacedBody, ...]:
-    placed: list[PlacedBody] = []
+    bodies: list[PlacedBody] = []
     for shapes, poses, body_of in (
         (item.primitives, item.primitive_poses, _primitive),
         (item.meshes, item.mesh_poses, _mesh),
         (item.planes, item.plane_poses, _plane),
     ):
         if len(poses) not in (len(shapes), 0):
-            raise ValueError(f"{len(shapes)} shapes have {len(poses)} poses; expected as many")
+            raise ValueError(f"{len(shapes)} shapes have {len(poses)} poses; expected one pose per shape")
         for index, shape in enumerate(shapes):
-            placed.append((_pose(poses[index]) if poses else Pose(), body_of(shape)))
-    return tuple(placed)
+            bodies.append((_pose(poses[index]) if poses else Pose(), body_of(shape)))
+    return tuple(bodies)
 
 
 def _primitive(primitive: Any) -> DrawnBody:
@@ -132,7 +132,7 @@ def _primitive(primitive: Any) -> DrawnBody:
 
 
 def _cone(height: float, radius: float) -> DrawnBody:
-    """Returns a cone: a cylinder whose upper rim is drawn together in its axis."""
+    """Returns a cone, made from a cylinder by moving its upper rim to the axis."""
     body = drawn_cylinder(radius, height, FREE_COLOUR, None)
     vertices = body.vertices.copy()
     vertices[vertices[:, 2] > 0, :2] = 0.0
@@ -143,7 +143,7 @@ def _mesh(mesh: Any) -> DrawnBody:
     vertices = np.array([(each.x, each.y, each.z) for each in mesh.vertices], dtype=np.float64).reshape(-1, 3)
     triangles = np.array([each.vertex_indices for each in mesh.triangles], dtype=np.int64).reshape(-1, 3)
     if not np.isfinite(vertices).all() or (len(triangles) and triangles.max() >= len(vertices)):
-        raise ValueError(f"a mesh names vertices beyond its {len(vertices)}, or has some that are not finite")
+        raise ValueError(f"a mesh refers to more than its {len(vertices)} vertices, or has vertices that are infinite")
     return DrawnBody(vertices, triangles, None, None, FREE_COLOUR, None)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the links of a robot are, from its description and joint positions."""
+"""Computes the poses of a robot's links from its description and joint positions."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class RobotLinks:
     """Forward kinematics of a robot.
 
     Args:
-        robot: Its description.
+        robot: Description of the robot.
 
     Attributes:
-        root: Name of the link that no joint carries.
+        root: Name of the root link.
 
     Raises:
-        DescriptionError: The links do not form a tree, or a joint mimics none that moves.
+        DescriptionError: The links do not form a tree, or a mimic joint has no movable leading joint.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -30,40 +30,41 @@ class RobotLinks:
         if len(roots) != 1:
             raise DescriptionError("robot_description", f"has {len(roots)} root links", "expected a tree of links")
         self.root = roots[0]
-        self._joints = _outwards(self.root, robot.joints)
+        self._joints = _sorted_from_root(self.root, robot.joints)
         names = [joint.name for joint in robot.movable_joints()]
         try:
             self._mimics = resolved({j.name: j.mimic for j in robot.joints if j.mimic is not None}, names)
         except ValueError as error:
-            raise DescriptionError("robot_description", str(error), "mend the description") from None
+            raise DescriptionError("robot_description", str(error), "correct the description") from None
         self._origins = {j.name: Pose.from_xyz_rpy(j.origin.xyz, j.origin.rpy) for j in self._joints}
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Pose]:
-        """Returns the poses of all links in the frame of the root.
+        """Returns the poses of all links in the frame of the root link.
 
         Args:
-            positions: Of joints [rad or m]; one that is missing and mimics none is at 0.
+            positions: Positions by joint name [rad or m]; the default is 0, or the mimic relation.
         """
-        found = {self.root: Pose()}
+        poses = {self.root: Pose()}
         for joint in self._joints:
-            pose = found[joint.parent] @ self._origins[joint.name]
-            found[joint.child] = pose @ _motion(joint, self._position(joint.name, positions)) if joint.movable else pose
-        return found
+            pose = poses[joint.parent] @ self._origins[joint.name]
+            poses[joint.child] = pose @ _motion(joint, self._position(joint.name, positions)) if joint.movable else pose
+        return poses
 
     def tip(self, joints: Collection[str]) -> str:
-        """Returns the link that the last of some joints carries: the one with most joints of the robot before it.
+        """Returns the child link of the joint that is farthest from the root, measured in joints.
 
-        Without a known joint, that is the root.
+        Args:
+            joints: Names of the considered joints; without a known joint, the result is the root link.
         """
-        depths, tip, deepest = {self.root: 0}, self.root, 0
+        depths, tip, max_depth = {self.root: 0}, self.root, 0
         for joint in self._joints:
             depths[joint.child] = depths[joint.parent] + 1
-            if joint.name in joints and depths[joint.child] > deepest:
-                tip, deepest = joint.child, depths[joint.child]
+            if joint.name in joints and depths[joint.child] > max_depth:
+                tip, max_depth = joint.child, depths[joint.child]
         return tip
 
     def carried_by(self, joints: Collection[str]) -> set[str]:
-        """Returns the links that some joints move, and joints that mimic them."""
+        """Returns the links that move with some joints or with the joints that mimic them."""
         moved: set[str] = set()
         for joint in self._joints:
             mimic = self._mimics.get(joint.name)
@@ -79,27 +80,27 @@ class RobotLinks:
 
 
 def finite_positions(names: Sequence[str], positions: Sequence[float]) -> dict[str, float]:
-    """Returns the positions of a message by joint; numbers that are not finite are left out.
+    """Returns the finite positions of a message, by joint name.
 
     Raises:
-        ValueError: There is not one position for each joint.
+        ValueError: The numbers of joints and positions differ.
     """
     if len(names) != len(positions):
-        raise ValueError(f"{len(names)} joints have {len(positions)} positions; expected as many")
+        raise ValueError(f"{len(names)} joints have {len(positions)} positions; expected one position per joint")
     return {name: value for name, value in zip(names, positions, strict=True) if math.isfinite(value)}
 
 
-def _outwards(root: str, joints: Sequence[Joint]) -> list[Joint]:
-    """Returns the joints so that each comes after those that carry it."""
+def _sorted_from_root(root: str, joints: Sequence[Joint]) -> list[Joint]:
+    """Returns the joints in an order in which parent joints precede child joints."""
     by_parent: dict[str, list[Joint]] = {}
     for joint in joints:
         by_parent.setdefault(joint.parent, []).append(joint)
     ordered: list[Joint] = []
     links = [root]
     while links:
-        below = by_parent.pop(links.pop(), [])
-        ordered += below
-        links += [joint.child for joint in below]
+        children = by_parent.pop(links.pop(), [])
+        ordered += children
+        links += [joint.child for joint in children]
     return ordered
 
 

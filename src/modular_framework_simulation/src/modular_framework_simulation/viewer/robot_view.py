@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the robot, and the motion that was planned for it."""
+"""Shows the robot and its planned motion."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from modular_framework_urdf.urdf_reader import read_urdf
 
 _GHOST: Colour = (1.0, 0.55, 0.1, 0.5)
 _GHOST_OUTSET_M = -0.001
-"""Outset of the ghost's surfaces: negative, so that none lies in a surface of the robot and flickers there."""
+"""Negative outset of the ghost's surfaces, which would otherwise flicker in the robot's surfaces."""
 _LINE_RGB = (255, 140, 20)
 _LINE_WIDTH_PX = 3.0
 
 
 class RobotView:
-    """The robot in a layer.
+    """Shows the robot in a layer.
 
     Args:
-        layer: Where it is drawn.
-        text: Its URDF.
-        find_package: Looks up the packages of package:// URIs.
-        log: Takes a line about a shape that cannot be drawn.
+        layer: Layer of the robot.
+        text: URDF of the robot.
+        find_package: Function that finds the packages of package:// URIs.
+        log: Function that logs a shape that cannot be drawn.
 
     Attributes:
-        links: Its kinematics.
-        in_world: Poses of its links, as they are drawn.
+        links: Forward kinematics of the robot.
+        in_world: Displayed poses of the links in the world frame, by name.
 
     Raises:
-        ValueError: The text is no URDF.
-        DescriptionError: Its links do not form a tree.
+        ValueError: The text is not a valid URDF.
+        DescriptionError: The links do not form a tree.
     """
 
     def __init__(self, layer: Layer, text: str, find_package: PackageFinder, log: Callable[[str], None]) -> None:
@@ -57,11 +57,11 @@ class RobotView:
         self.place({}, self.base)
 
     def place(self, positions: Mapping[str, float], base: Pose) -> None:
-        """Puts the robot at joint positions [rad or m]; joints that are left out stay.
+        """Moves the robot to joint positions; other joints keep their positions.
 
         Args:
-            positions: By joint.
-            base: Pose of the root in the world.
+            positions: Positions by joint name [rad or m].
+            base: Pose of the root link in the world frame.
         """
         self._positions |= positions
         self.base = base
@@ -70,16 +70,16 @@ class RobotView:
             self._layer.place(tree_name(link), self.in_world[link])
 
     def bodies_carried_by(self, joints: tuple[str, ...]) -> dict[str, list[PlacedBody]]:
-        """Returns what is seen of the links that some joints move."""
+        """Returns the bodies of the links that some joints move, by link name."""
         moved = self.links.carried_by(joints)
         return {link: bodies for link, bodies in self._bodies.items() if link in moved}
 
 
 class PlanView:
-    """The planned motion: the way of the last link as a line, and a ghost of the robot that moves along it.
+    """Shows the planned motion: the path of the last moving link as a line, and a moving ghost of the robot.
 
     Args:
-        layer: Where it is drawn.
+        layer: Layer of the ghost.
         server: The viser server.
     """
 
@@ -92,11 +92,11 @@ class PlanView:
 
     @property
     def duration_s(self) -> float:
-        """How long the motion takes [s]; 0 without one."""
+        """Returns the duration of the motion [s]; 0 without a motion."""
         return self._plan.duration_s if self._plan is not None else 0.0
 
     def show(self, plan: Plan | None, robot: RobotView) -> None:
-        """Draws the line of a plan; None: nothing."""
+        """Shows the line of a plan, or hides the line for None."""
         self.hide_ghost()
         self._plan, self._robot = plan, robot
         if self._line is not None:
@@ -104,13 +104,13 @@ class PlanView:
             self._line = None
         if plan is None:
             return
-        way = np.array([(robot.base @ Pose(tuple(point))).position for point in plan.line(robot.links)])
+        path = np.array([(robot.base @ Pose(tuple(point))).position for point in plan.line(robot.links)])
         self._line = self._server.scene.add_line_segments(
-            "/plan/path", np.stack([way[:-1], way[1:]], axis=1), colors=_LINE_RGB, line_width=_LINE_WIDTH_PX
+            "/plan/path", np.stack([path[:-1], path[1:]], axis=1), colors=_LINE_RGB, line_width=_LINE_WIDTH_PX
         )
 
     def show_ghost(self, time_s: float) -> None:
-        """Draws the robot as it is planned for a time from the beginning [s]."""
+        """Shows the ghost at a time from the start of the plan [s]."""
         plan, robot = self._plan, self._robot
         if plan is None or robot is None:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the root of a robot is in the fixed frame."""
+"""Tracks the pose of a robot's root link in the fixed frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_simulation.models.poses import Pose, normalised_quaternio
 
 
 class BasePose:
-    """Follows transforms, if the root of the robot is not the fixed frame itself.
+    """Listens to transforms if the fixed frame is not the robot's root link.
 
     Args:
         fixed_frame: Name of the frame that is drawn at the origin.
@@ -25,7 +25,7 @@ class BasePose:
         self._last = Pose()
 
     def find(self, root: str) -> Pose:
-        """Returns the pose of a root link in the fixed frame; the last one known where there is no transform."""
+        """Returns the pose of a root link in the fixed frame; without a transform, the last known pose."""
         if root == self._fixed_frame:
             return Pose()
         if self._listener is None:
@@ -40,7 +40,7 @@ class BasePose:
         return self._last
 
     def close(self) -> None:
-        """Ends to listen; may be called twice."""
+        """Stops listening; may be called twice."""
         if self._listener is not None:
             self._listener.unregister()
             self._listener = self._buffer = None

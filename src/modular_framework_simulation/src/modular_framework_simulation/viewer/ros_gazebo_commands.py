@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The buttons' services of the simulation."""
+"""Calls the simulation's services for the buttons of the control panel."""
 
 from __future__ import annotations
 
@@ -27,46 +27,46 @@ class GazeboCommands:
     """Calls /gazebo/{pause,unpause}_physics, step_time, reset_{world,simulation} and {get,set}_physics_properties."""
 
     def pause(self) -> None:
-        """Stops time."""
+        """Pauses time."""
         _call(ros_names.PAUSE_PHYSICS, Empty, EmptyRequest())
 
     def unpause(self) -> None:
-        """Resumes time."""
+        """Unpauses time."""
         _call(ros_names.UNPAUSE_PHYSICS, Empty, EmptyRequest())
 
     def step(self, duration_s: float) -> None:
-        """Stops time and lets a duration pass [s]; 0 is one physics step."""
+        """Pauses time and advances by a duration [s]; 0 for one physics step."""
         self.pause()
         duration = rospy.Duration.from_sec(duration_s)
-        answer = _call(ros_names.STEP_TIME, AdvanceTime, AdvanceTimeRequest(duration), _RESET_TIMEOUT_S)
-        if not answer.success:
-            raise CommandError(f"{ros_names.STEP_TIME}: {answer.message}")
+        response = _call(ros_names.STEP_TIME, AdvanceTime, AdvanceTimeRequest(duration), _RESET_TIMEOUT_S)
+        if not response.success:
+            raise CommandError(f"{ros_names.STEP_TIME}: {response.message}")
 
     def reset_world(self) -> None:
-        """Puts models and robot where they started."""
+        """Resets the models and the robot to their initial poses."""
         _call(ros_names.RESET_WORLD, Empty, EmptyRequest(), _RESET_TIMEOUT_S)
 
     def reset_simulation(self) -> None:
-        """Puts models and robot where they started, and time to 0."""
+        """Resets the models and the robot to their initial poses, and time to 0."""
         _call(ros_names.RESET_SIMULATION, Empty, EmptyRequest(), _RESET_TIMEOUT_S)
 
     def set_real_time_factor(self, factor: float) -> None:
-        """Bounds simulated over real time; 0: as fast as possible."""
-        present = self._physics()
+        """Sets the maximum ratio of simulated to real time; 0 for as fast as possible."""
+        current = self._physics()
         request = SetPhysicsPropertiesRequest(
-            time_step=present.time_step,
-            max_update_rate=factor / present.time_step,
-            gravity=present.gravity,
-            ode_config=present.ode_config,
+            time_step=current.time_step,
+            max_update_rate=factor / current.time_step,
+            gravity=current.gravity,
+            ode_config=current.ode_config,
         )
-        answer = _call(ros_names.SET_PHYSICS_PROPERTIES, SetPhysicsProperties, request)
-        if not answer.success:
-            raise CommandError(answer.status_message)
+        response = _call(ros_names.SET_PHYSICS_PROPERTIES, SetPhysicsProperties, request)
+        if not response.success:
+            raise CommandError(response.status_message)
 
     def real_time_factor(self) -> float:
-        """Returns that bound, to four digits."""
-        present = self._physics()
-        return float(f"{present.max_update_rate * present.time_step:.4g}")
+        """Returns the maximum ratio of simulated to real time, rounded to four digits."""
+        current = self._physics()
+        return float(f"{current.max_update_rate * current.time_step:.4g}")
 
     def _physics(self) -> Any:
         return _call(ros_names.GET_PHYSICS_PROPERTIES, GetPhysicsProperties, GetPhysicsPropertiesRequest())
@@ -75,8 +75,14 @@ class GazeboCommands:
 def _call(name: str, kind: Any, request: Any, timeout_s: float = _TIMEOUT_S) -> Any:
     """Calls a service.
 
+    Args:
+        name: Name of the service.
+        kind: Type of the service.
+        request: Request of the call.
+        timeout_s: Timeout of the response [s].
+
     Raises:
-        CommandError: There is no simulation, or it did not answer.
+        CommandError: The simulation is not running or did not respond.
     """
     try:
         return request_service(name, kind, request, timeout_s)

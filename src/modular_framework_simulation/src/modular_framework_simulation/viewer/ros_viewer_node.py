@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The viewer as a ROS node: draws in a browser what public topics say about world, robot, planning scene and plan."""
+"""ROS node of the viewer, which shows world, robot, planning scene and plan of public topics in a browser."""
 
 from __future__ import annotations
 
@@ -37,32 +37,32 @@ from modular_framework_simulation.viewer.world_view import RealTimeFactor, World
 
 _NODE = "viewer"
 _NICENESS = 5
-"""Physics and controllers come first where processors are scarce."""
+"""Lower priority than physics and controllers on a busy CPU."""
 _RATE_HZ = 25.0
 _IDLE_PERIOD_S = 0.2
-"""Longest wait of a new client until something is drawn [s]."""
-_LOOK_AROUND_PERIOD_S = 2.0
+"""Maximum delay until the scene is drawn for a new client [s]."""
+_SEARCH_PERIOD_S = 2.0
 _IMAGE_PERIOD_S = 0.2
 _STATUS_PERIOD_S = 0.25
 _SCENE_MESSAGES = 1000
 
 
 class ViewerNode:
-    """Draws while a browser is connected, and rests otherwise.
+    """Draws the scene while a browser is connected, and is idle otherwise.
 
     Parameters: see `parameters/viewer.yaml`.
 
     Subscribes, while a browser is connected: /gazebo/visible_models and /gazebo/visible_poses (std_msgs/String),
-    joint_states (sensor_msgs/JointState), /tf and /tf_static where the root of the robot is not the fixed frame, and,
-    while they are shown, /move_group/monitored_planning_scene (moveit_msgs/PlanningScene),
-    /move_group/display_planned_path (moveit_msgs/DisplayTrajectory) and one topic with images (sensor_msgs/Image).
+    joint_states (sensor_msgs/JointState), and /tf and /tf_static if the robot's root link is not the fixed frame. Only
+    while shown: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene),
+    /move_group/display_planned_path (moveit_msgs/DisplayTrajectory) and an image topic (sensor_msgs/Image).
 
-    Services called: those of `GazeboCommands`.
+    Services called: see `GazeboCommands`.
 
     Args:
-        server: Serves the page.
-        fixed_frame: The frame that is drawn at the origin.
-        read_only: Whether no button acts on the simulation.
+        server: Server of the page.
+        fixed_frame: Frame that is drawn at the origin.
+        read_only: Whether the page cannot change the simulation.
     """
 
     def __init__(self, server: WebServer, fixed_frame: str, read_only: bool) -> None:
@@ -84,37 +84,37 @@ class ViewerNode:
         self._factor = RealTimeFactor()
         self._status = Status(None, False, 0.0)
         self._replay_from_s: float | None = None
-        self._scrubbed_to: float | None = None
+        self._scrub_position: float | None = None
         self._due_s: dict[str, float] = {}
         self._faults: dict[str, str] = {}
-        self._was_watched = False
+        self._had_clients = False
         self._panel.on_replay(self._start_replay)
         self._panel.on_position(self._scrub)
 
     def run(self) -> None:
-        """Draws until ROS shuts down."""
+        """Draws the scene until ROS shuts down."""
         while not rospy.is_shutdown():
-            begun_s = time.monotonic()
-            watched = self._server.has_clients
-            self._guard("drawing", self._draw if watched else self._rest)
-            self._was_watched = watched
-            period_s = 1 / _RATE_HZ if watched else _IDLE_PERIOD_S
-            time.sleep(max(0.0, begun_s + period_s - time.monotonic()))
+            start_s = time.monotonic()
+            has_clients = self._server.has_clients
+            self._guard("drawing", self._draw if has_clients else self._unsubscribe)
+            self._had_clients = has_clients
+            period_s = 1 / _RATE_HZ if has_clients else _IDLE_PERIOD_S
+            time.sleep(max(0.0, start_s + period_s - time.monotonic()))
 
-    def _rest(self) -> None:
+    def _unsubscribe(self) -> None:
         for feed in (self._models, self._poses, self._joints, self._scenes, self._paths, self._images):
             if feed is not None:
                 feed.switch(False)
         self._base.close()
 
     def _draw(self) -> None:
-        if not self._was_watched:
+        if not self._had_clients:
             self._due_s.clear()
         for feed in (self._models, self._poses, self._joints):
             feed.switch(True)
         self._paths.switch(self._panel.shows("plan"))
-        if self._is_due("look around", _LOOK_AROUND_PERIOD_S):
-            self._guard("looking for simulation and robot", self._look_around)
+        if self._is_due("look around", _SEARCH_PERIOD_S):
+            self._guard("looking for simulation and robot", self._search)
         for name, layer in self._layers.items():
             layer.visible = self._panel.shows(name)
         self._server.show_grid(self._panel.shows("grid"))
@@ -134,10 +134,10 @@ class ViewerNode:
             self._guard(feed.topic, lambda message=message: work(message))  # type: ignore[misc]
 
     def _guard(self, what: str, work: Callable[[], None]) -> None:
-        """Does something; what goes wrong is logged once, and the viewer goes on."""
+        """Runs a function; an exception is logged once, and the viewer continues."""
         try:
             work()
-        except Exception as error:  # any node may publish anything
+        except Exception as error:  # any node may publish invalid messages
             known = isinstance(error, SimulationError | ValueError)
             fault = str(error) if known else f"unexpected {type(error).__name__}: {error}"
             if self._faults.get(what) != fault:
@@ -151,16 +151,16 @@ class ViewerNode:
         self._due_s[what] = now_s + period_s
         return True
 
-    def _look_around(self) -> None:
-        """Looks what there is: a simulation, a robot, cameras."""
-        there = _has_service(ros_names.PAUSE_PHYSICS)
-        if there != (self._status.time_s is not None):
-            self._status = Status(0.0 if there else None, False, 0.0)
-            if there:
+    def _search(self) -> None:
+        """Searches for a simulation, a robot and cameras."""
+        has_simulation = _has_service(ros_names.PAUSE_PHYSICS)
+        if has_simulation != (self._status.time_s is not None):
+            self._status = Status(0.0 if has_simulation else None, False, 0.0)
+            if has_simulation:
                 self._panel.refresh_speed()
-        if not there:
+        if not has_simulation:
             self._world.show(())
-        if not there and not self._was_watched:
+        if not has_simulation and not self._had_clients:
             self._panel.show_planning_scene()
         images = [name for name, kind in rospy.get_published_topics() if kind == Image._type]
         self._panel.offer_cameras(images)
@@ -208,15 +208,15 @@ class ViewerNode:
             self._start_replay()
 
         self._take(self._paths, show)
-        share, self._scrubbed_to = self._scrubbed_to, None
-        if share is not None:
+        fraction, self._scrub_position = self._scrub_position, None
+        if fraction is not None:
             self._replay_from_s = None
-            self._plan.show_ghost(share * self._plan.duration_s)
+            self._plan.show_ghost(fraction * self._plan.duration_s)
         if self._replay_from_s is None:
             return
-        passed_s = time.monotonic() - self._replay_from_s
-        if passed_s <= self._plan.duration_s:
-            self._plan.show_ghost(passed_s)
+        elapsed_s = time.monotonic() - self._replay_from_s
+        if elapsed_s <= self._plan.duration_s:
+            self._plan.show_ghost(elapsed_s)
         elif self._panel.repeats and self._plan.duration_s > 0.0:
             self._start_replay()
         else:
@@ -226,8 +226,8 @@ class ViewerNode:
     def _start_replay(self) -> None:
         self._replay_from_s = time.monotonic()
 
-    def _scrub(self, share: float) -> None:
-        self._scrubbed_to = share
+    def _scrub(self, fraction: float) -> None:
+        self._scrub_position = fraction
 
     def _draw_image(self) -> None:
         topic = self._panel.camera
@@ -258,9 +258,9 @@ def main() -> int:
     """Runs the node.
 
     Returns:
-        Exit code: 0 after an ordinary shutdown, 1 where the page cannot be served.
+        Exit code: 0 after a regular shutdown, 1 if the page cannot be served.
     """
-    # Without simulated time: the viewer runs on while time is paused.
+    # Without simulated time, the viewer continues while time is paused.
     rospy.init_node(_NODE, disable_rostime=True)
     os.nice(_NICENESS)
     read = DeclaredParameters("modular_framework_simulation", "viewer").values
@@ -271,7 +271,7 @@ def main() -> int:
         rospy.logfatal("the viewer cannot start: %s", error)
         return 1
     if server.port != port:
-        rospy.logwarn("port %s is taken: the viewer uses %d", port, server.port)
+        rospy.logwarn("port %s is in use; the viewer uses port %d", port, server.port)
     rospy.loginfo("viewer: open %s in a browser", server.address)
     ViewerNode(server, frame, read_only).run()
     server.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server of the page: its address, its lights, and where a new client looks from."""
+"""Web server of the viewer: address, lights, and initial camera pose."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.viewer.access import Access
 
 _TITLE = "Modular Benchmarking Framework"
-_PORTS_TRIED = 100
+_MAX_PORTS = 100
 _VIEW_DIRECTION = np.array([0.75, 0.55, 0.45])
-_DISTANCE = 1.5
-"""Of the camera from what it looks at, in sizes of that."""
-_SMALLEST_VIEW_M = 0.8
+_DISTANCE_RATIO = 1.5
+"""Ratio of the camera distance to the size of the viewed region."""
+_MIN_VIEW_SIZE_M = 0.8
 
 
 class AddressError(SimulationError):
@@ -28,15 +28,15 @@ class AddressError(SimulationError):
 
 
 def free_port(host: str, port: int) -> int:
-    """Returns a port that can be listened at, or else one of the next hundred.
+    """Returns the port, or if it is in use, one of the next hundred ports.
 
     Raises:
-        AddressError: The address is none of this machine, the port may not be used, or all are taken.
+        AddressError: The address does not belong to this machine, the port is not permitted, or all ports are in use.
     """
     if not 1 <= port <= 65535:
         raise AddressError(f"port {port} does not exist; allowed: 1 to 65535")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    for candidate in range(port, min(port + _PORTS_TRIED, 65536)):
+    for candidate in range(port, min(port + _MAX_PORTS, 65536)):
         try:
             with socket.create_server((host, candidate), family=family):
                 return candidate
@@ -44,26 +44,26 @@ def free_port(host: str, port: int) -> int:
             fault = error
             if error.errno != errno.EADDRINUSE:
                 break
-    raise AddressError(f"cannot listen at {host}, port {port}: {fault}; use another address or port") from fault
+    raise AddressError(f"cannot listen on {host}, port {port}: {fault}; use another address or port") from fault
 
 
 class WebServer:
-    """The page and its connections.
+    """Serves the page.
 
     Args:
-        host: Address to listen at.
-        port: A free port.
+        host: Address of the server.
+        port: Unused port.
     """
 
     def __init__(self, host: str, port: int) -> None:
-        import viser  # takes a second
+        import viser  # takes a second to import
 
         self._access = Access()
         with contextlib.redirect_stdout(io.StringIO()), self._access.enforced():  # without viser's banner
             self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
         self.host, self.port = host, int(self.viser.get_port())
         self.viser.gui.configure_theme(
-            control_layout="collapsible",  # beside the scene; a floating panel hides a part of it
+            control_layout="collapsible",  # beside the scene, because a floating panel would hide a part of the scene
             show_share_button=False,
             show_logo=False,
             dark_mode=False,
@@ -74,39 +74,39 @@ class WebServer:
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
+        """Returns the URL of the page."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/{self._access.token}/"
 
     @property
     def has_clients(self) -> bool:
-        """Whether a browser shows the page."""
+        """Returns whether a browser is connected."""
         return bool(self.viser.get_clients())
 
     def show_grid(self, visible: bool) -> None:
-        """Shows or hides the grid at z = 0, whose lines are 0.1 m apart."""
+        """Shows or hides the grid at z = 0 with a spacing of 0.1 m."""
         if self._grid.visible != visible:
             self._grid.visible = visible
 
     def show_shadows(self, on: bool) -> None:
-        """Switches shadows on or off."""
+        """Enables or disables shadows."""
         if self._shadows != on:
             self._shadows = on
             self.viser.scene.configure_default_lights(enabled=True, cast_shadow=on)
 
     def look_at(self, points: NDArray[np.float64]) -> None:
-        """Has all clients look at some points, and those that come later at first.
+        """Points the cameras of all current and future clients at a set of points.
 
         Args:
-            points: shape (n, 3) [m].
+            points: Points in the fixed frame, shape (n, 3) [m].
         """
         low, high = points.min(axis=0), points.max(axis=0)
-        centre, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), _SMALLEST_VIEW_M)
-        position = centre + _VIEW_DIRECTION * size * _DISTANCE
+        centre, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), _MIN_VIEW_SIZE_M)
+        position = centre + _VIEW_DIRECTION * size * _DISTANCE_RATIO
         for camera in (self.viser.initial_camera, *(client.camera for client in self.viser.get_clients().values())):
             camera.position = position
             camera.look_at = centre
 
     def close(self) -> None:
-        """Ends the server."""
+        """Stops the server."""
         self.viser.stop()

@@ -15,11 +15,11 @@ _FACTOR_WINDOW_S = 2.0
 
 
 class WorldView:
-    """The models of the world in a layer.
+    """Shows the models of the world in a layer.
 
     Args:
-        layer: Where they are drawn.
-        log: Takes a line about a shape that cannot be drawn.
+        layer: Layer of the models.
+        log: Function that logs a shape that cannot be drawn.
     """
 
     def __init__(self, layer: Layer, log: Callable[[str], None]) -> None:
@@ -27,12 +27,12 @@ class WorldView:
         self._paths: dict[int, tuple[str, ...]] = {}
 
     def show(self, models: Sequence[VisibleModel]) -> None:
-        """Draws exactly these models; those that are drawn already stay as they are."""
-        new = {model.number: model for model in models}
-        for number in [number for number in self._paths if number not in new]:
+        """Shows exactly these models; models that are already shown are not changed."""
+        shown = {model.number: model for model in models}
+        for number in [number for number in self._paths if number not in shown]:
             for path in self._paths.pop(number):
                 self._layer.remove(path)
-        for number, model in new.items():
+        for number, model in shown.items():
             if number in self._paths:
                 continue
             paths = []
@@ -48,30 +48,30 @@ class WorldView:
             self._paths[number] = tuple(paths)
 
     def place(self, poses: ScenePoses) -> None:
-        """Puts the models where they are; models that are not drawn are left out."""
+        """Moves the models to their poses; models that are not shown are ignored."""
         for number, links in poses.poses.items():
             for path, pose in zip(self._paths.get(number, ()), links, strict=False):
                 self._layer.place(path, pose)
 
 
 class RealTimeFactor:
-    """How fast simulated time runs, measured over the last seconds."""
+    """Measures the ratio of simulated to real time over the last seconds."""
 
     def __init__(self) -> None:
-        self._seen: deque[tuple[float, int]] = deque()
+        self._samples: deque[tuple[float, int]] = deque()
 
     def note(self, now_s: float, time_ns: int) -> None:
-        """Takes simulated time [ns] at an instant of real time [s]; time that goes back starts again."""
-        if self._seen and time_ns < self._seen[-1][1]:
-            self._seen.clear()
-        self._seen.append((now_s, time_ns))
-        while len(self._seen) > 2 and self._seen[1][0] < now_s - _FACTOR_WINDOW_S:
-            self._seen.popleft()
+        """Adds a sample of simulated time [ns] and real time [s]; decreasing simulated time resets the measurement."""
+        if self._samples and time_ns < self._samples[-1][1]:
+            self._samples.clear()
+        self._samples.append((now_s, time_ns))
+        while len(self._samples) > 2 and self._samples[1][0] < now_s - _FACTOR_WINDOW_S:
+            self._samples.popleft()
 
     @property
     def value(self) -> float:
-        """Simulated over real time; 0 where too little is known."""
-        if len(self._seen) < 2:
+        """Returns the ratio of simulated to real time; 0 with less than two samples."""
+        if len(self._samples) < 2:
             return 0.0
-        (first_s, first_ns), (last_s, last_ns) = self._seen[0], self._seen[-1]
+        (first_s, first_ns), (last_s, last_ns) = self._samples[0], self._samples[-1]
         return (last_ns - first_ns) * 1e-9 / max(last_s - first_s, 1e-9)

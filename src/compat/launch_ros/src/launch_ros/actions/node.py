@@ -39,7 +39,8 @@ class Node(ExecuteProcess):
             derived from the program.
         namespace: Namespace of the node, absolute or relative to the pushed namespace.
         exec_name: Name of the process in messages.
-        parameters: Dicts, paths of YAML files, ParameterFile or Parameter objects; later entries override earlier ones.
+        parameters: Dicts, paths of YAML files, ParameterFile or Parameter objects; later entries override earlier
+            entries.
         remappings: Pairs of old and new name.
         ros_arguments: ROS arguments of ROS 2: `-r a:=b`, `-p a:=b`, `--params-file FILE`.
         arguments: Arguments of the program.
