@@ -162,7 +162,7 @@ def test_answers_to_earlier_instructions_are_no_damaged_packets(
     bus: DynamixelBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answer_to_a_write = b"\xff\xff\x01\x02\x00\xfc"
-    monkeypatch.setattr(dynamixel_line, "answer_bus", lambda servos, instruction: answer_to_a_write)
+    monkeypatch.setattr(dynamixel_line, "bus_response", lambda servos, instruction: answer_to_a_write)
     with pytest.raises(NoResponseError, match="does not respond"):
         bus.read(1, mx64.READING)
 
@@ -220,7 +220,7 @@ def test_the_line_comes_back_under_its_name(line: DynamixelLine, bus: DynamixelB
 
 def test_the_link_does_not_replace_a_file(make_line: MakeLine, tmp_path: Path) -> None:
     (tmp_path / "gripper0").write_text("mine")
-    with pytest.raises(OSError, match="exists and is no link"):
+    with pytest.raises(OSError, match="exists and is not a symbolic link"):
         make_line()
 
 

@@ -12,7 +12,7 @@ from modular_framework_drivers.emulators.dynamixel_servo import (
     DynamixelServo,
     Instruction,
     PacketReader,
-    answer_bus,
+    bus_response,
     checksum,
     packet,
 )
@@ -23,7 +23,7 @@ from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 def talk(servos: list[DynamixelServo], sent: str) -> str:
     """What the servos answer to bytes, both in hexadecimal as the manual writes them."""
     return (
-        b"".join(answer_bus(servos, instruction) for instruction in PacketReader().feed(bytes.fromhex(sent)))
+        b"".join(bus_response(servos, instruction) for instruction in PacketReader().feed(bytes.fromhex(sent)))
         .hex(" ")
         .upper()
     )
@@ -81,13 +81,13 @@ def test_the_bulk_read_of_the_manual_is_answered_in_order() -> None:
 @pytest.mark.parametrize(
     ("instruction", "errors"),
     [
-        (Instruction(1, 2, b"\x24\x02", intact=False), ServoErrors.CHECKSUM),
-        (Instruction(1, 9, b"", intact=True), ServoErrors.INSTRUCTION),
-        (Instruction(1, 5, b"", intact=True), ServoErrors.INSTRUCTION),  # action without reg write
-        (Instruction(1, 2, b"\x48\x09", intact=True), ServoErrors.RANGE),  # beyond the table
-        (Instruction(1, 3, b"\x24\x00\x00", intact=True), ServoErrors.RANGE),  # present position is read only
-        (Instruction(1, 3, b"\x22\x00\x04", intact=True), ServoErrors.RANGE),  # torque limit 1024
-        (Instruction(1, 3, b"\x1e\x00\x10", intact=True), ServoErrors.ANGLE_LIMIT),  # goal 4096 in joint mode
+        (Instruction(1, 2, b"\x24\x02", checksum_valid=False), ServoErrors.CHECKSUM),
+        (Instruction(1, 9, b"", checksum_valid=True), ServoErrors.INSTRUCTION),
+        (Instruction(1, 5, b"", checksum_valid=True), ServoErrors.INSTRUCTION),  # action without reg write
+        (Instruction(1, 2, b"\x48\x09", checksum_valid=True), ServoErrors.RANGE),  # beyond the table
+        (Instruction(1, 3, b"\x24\x00\x00", checksum_valid=True), ServoErrors.RANGE),  # present position is read only
+        (Instruction(1, 3, b"\x22\x00\x04", checksum_valid=True), ServoErrors.RANGE),  # torque limit 1024
+        (Instruction(1, 3, b"\x1e\x00\x10", checksum_valid=True), ServoErrors.ANGLE_LIMIT),  # goal 4096 in joint mode
     ],
 )
 def test_what_is_not_allowed_is_refused_with_its_bit(instruction: Instruction, errors: ServoErrors) -> None:
@@ -173,7 +173,7 @@ def test_packets_are_found_among_garbage_however_they_are_cut(
 def test_no_bytes_whatever_upset_the_servos(noise: bytes) -> None:
     servos = [DynamixelServo(0), DynamixelServo(1)]
     for instruction in PacketReader().feed(noise):
-        assert isinstance(answer_bus(servos, instruction), bytes)
+        assert isinstance(bus_response(servos, instruction), bytes)
         assert instruction.servo_id <= BROADCAST
 
 

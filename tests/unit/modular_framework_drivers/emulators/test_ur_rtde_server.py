@@ -96,5 +96,5 @@ def test_a_data_package_of_no_recipe_or_of_the_wrong_length_ends_the_connection(
     with pytest.raises(RtdeProtocolError, match="unknown recipe"):
         session.receive(package("U", b"\x09\x00"))
     session.receive(package("I", b"input_int_register_5"))
-    with pytest.raises(RtdeProtocolError, match="3 bytes; its recipe has 4"):
+    with pytest.raises(RtdeProtocolError, match="3 bytes; expected 4"):
         session.receive(package("U", b"\x01\x00\x00\x00"))

@@ -86,13 +86,13 @@ class CommandPort:
 
     def __init__(self, commands: Mapping[str, Command], port: int = 0, address: str = LOOPBACK) -> None:
         self._commands = dict(commands)
-        self._wanted = (address, port)
+        self._requested_address = (address, port)
         self._server: socketserver.ThreadingTCPServer | None = None
 
     @property
     def port(self) -> int:
         """Returns the TCP port; before `connect`, the requested port."""
-        return int(self._server.server_address[1]) if self._server is not None else self._wanted[1]
+        return int(self._server.server_address[1]) if self._server is not None else self._requested_address[1]
 
     def connect(self) -> None:
         """Opens the port.
@@ -112,9 +112,9 @@ class CommandPort:
             daemon_threads = True
 
         try:
-            self._server = Server(self._wanted, Handler)
+            self._server = Server(self._requested_address, Handler)
         except OSError as error:
-            address, port = self._wanted
+            address, port = self._requested_address
             raise OSError(
                 error.errno, f"command port {address}:{port}: {error.strerror}; choose another port"
             ) from error

@@ -32,7 +32,7 @@ class FingerModel:
             words; torque control holds the current, so the voltage rises with the speed.
         friction: Maximum duty without motion, in [0, 1].
         stiffness: Stiffness of stops and objects: duty per tick of penetration [1/tick].
-        overload_share: Minimum duty of an overload, in [0, 1].
+        overload_fraction: Minimum duty of an overload, in [0, 1].
         overload_s: Minimum duration of an overload [s].
         room_temperature: Temperature of the room [deg C].
         heating: Temperature rise at full duty without motion [K/s].
@@ -48,7 +48,7 @@ class FingerModel:
     torque_mode_gain: float = 3.0
     friction: float = 0.03
     stiffness: float = 0.01
-    overload_share: float = 0.7
+    overload_fraction: float = 0.7
     overload_s: float = 2.0
     room_temperature: float = 30.0
     heating: float = 0.5
@@ -74,7 +74,7 @@ class Finger:
         self._was_shut = False
         self._duty = 0.0
         self._overloaded_s = 0.0
-        self._left_s = 0.0
+        self._remaining_s = 0.0
         self._publish()
 
     @property
@@ -84,9 +84,9 @@ class Finger:
 
     def advance(self, duration_s: float) -> None:
         """Simulates a time [s] in steps that are short enough for the stiff contacts."""
-        self._left_s += duration_s
-        while self._left_s >= STEP_S:
-            self._left_s -= STEP_S
+        self._remaining_s += duration_s
+        while self._remaining_s >= STEP_S:
+            self._remaining_s -= STEP_S
             self._step(STEP_S)
         self._take_offered()
         self._publish()
@@ -110,7 +110,7 @@ class Finger:
 
     def _step(self, period_s: float) -> None:
         model = self.model
-        self._duty = self._wanted_duty()
+        self._duty = self._target_duty()
         pushed = self._duty - self._resistance()
         free = math.copysign(max(0.0, abs(pushed) - model.friction), pushed)
         gain = model.torque_mode_gain if self.servo.get(mx64.TORQUE_CONTROL_MODE) else 1.0
@@ -119,7 +119,7 @@ class Finger:
         self.angle += self.speed * period_s
         self._heat(period_s)
 
-    def _wanted_duty(self) -> float:
+    def _target_duty(self) -> float:
         """Returns the duty of the motor, counter-clockwise (opening) positive."""
         servo = self.servo
         limit = servo.get(mx64.TORQUE_LIMIT) / mx64.TORQUE_MAX
@@ -142,7 +142,7 @@ class Finger:
         model = self.model
         excess = self.temperature - model.room_temperature
         self.temperature += (model.heating * self._duty**2 - model.cooling * excess) * period_s
-        pressing = abs(self._duty) > model.overload_share and abs(self.speed) < 0.05 * model.top_speed
+        pressing = abs(self._duty) > model.overload_fraction and abs(self.speed) < 0.05 * model.top_speed
         in_torque_mode = bool(self.servo.get(mx64.TORQUE_CONTROL_MODE))
         self._overloaded_s = self._overloaded_s + period_s if pressing and not in_torque_mode else 0.0
         if self._overloaded_s > model.overload_s:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An emulated Dynamixel MX-64, as seen on its serial line: packets of protocol 1.0 and the register table.
+"""Emulates a Dynamixel MX-64 on a serial line: packets of protocol 1.0, and the control table with the registers.
 
-The motor is a model of its own (`dynamixel_finger`): it reads the servo's goals and writes the measured values.
+The motor model (`dynamixel_finger`) reads the goals from the registers, and writes the measured values to registers.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from modular_framework_drivers.ezgripper.mx64 import Register, ServoErrors, from
 PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, SYNC_WRITE, BULK_READ = 1, 2, 3, 4, 5, 6, 0x83, 0x92
 BROADCAST = 0xFE
 HEADER = b"\xff\xff"
-TABLE_SIZE = 74
+CONTROL_TABLE_SIZE = 74
 POSITION_RANGE = 28672
-FACTORY = {
+FACTORY_VALUES = {
     mx64.MODEL_NUMBER: mx64.MODEL_NUMBER_MX64,
     mx64.FIRMWARE_VERSION: 41,
     mx64.SERVO_ID: 1,
@@ -40,7 +40,7 @@ FACTORY = {
 }
 EEPROM_END = 24
 READ_ONLY = {0, 1, 2, *range(36, 47), 50, 51}
-LARGEST = {
+MAX_VALUES = {
     mx64.SERVO_ID: 252,
     mx64.BAUD_RATE: 252,
     mx64.RETURN_DELAY_TIME: 254,
@@ -63,7 +63,7 @@ LARGEST = {
 
 
 def checksum(body: bytes | Iterable[int]) -> int:
-    """The last byte of a packet: the inverted sum of everything between header and it."""
+    """Returns the checksum of a packet: the inverted sum of the bytes between header and checksum."""
     return ~sum(body) & 0xFF
 
 
@@ -81,12 +81,19 @@ def packet(servo_id: int, kind: int, parameters: bytes = b"") -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """An instruction as it came over the line."""
+    """Received instruction packet.
+
+    Attributes:
+        servo_id: Address of the servo, or `BROADCAST`.
+        kind: Instruction, such as `READ`.
+        parameters: Bytes between `kind` and the checksum.
+        checksum_valid: Whether the checksum is correct.
+    """
 
     servo_id: int
     kind: int
     parameters: bytes
-    intact: bool
+    checksum_valid: bool
 
 
 class PacketReader:
@@ -122,89 +129,92 @@ class PacketReader:
 
 
 class DynamixelServo:
-    """One servo: its registers, and its answers.
+    """Emulates the registers of a servo and its responses to instructions.
 
     Args:
-        servo_id: its number on the line.
-        baudrate_word: word of its baud rate register.
+        servo_id: Address of the servo.
+        baudrate_word: Value of the baud rate register.
+
+    Attributes:
+        errors: Errors in each status packet.
     """
 
     def __init__(self, servo_id: int = 1, baudrate_word: int = 34) -> None:
-        self._table = bytearray(TABLE_SIZE)
-        self._registered: bytes | None = None
+        self._table = bytearray(CONTROL_TABLE_SIZE)
+        self._registered_write: bytes | None = None
         self.errors = ServoErrors.NONE
         self._reset()
         self.set(mx64.SERVO_ID, servo_id)
         self.set(mx64.BAUD_RATE, baudrate_word)
 
     def _reset(self) -> None:
-        self._table[:] = bytes(TABLE_SIZE)
-        for register, value in FACTORY.items():
+        self._table[:] = bytes(CONTROL_TABLE_SIZE)
+        for register, value in FACTORY_VALUES.items():
             self.set(register, value)
 
     @property
     def servo_id(self) -> int:
-        """Its number on the line."""
+        """Returns the address of the servo."""
         return self.get(mx64.SERVO_ID)
 
     @property
     def baudrate(self) -> float:
-        """Its baud rate [bit/s], by the manual's formula."""
+        """Returns the baud rate [bit/s], by the formula in the manual."""
         word = self.get(mx64.BAUD_RATE)
         return {250: 2.25e6, 251: 2.5e6, 252: 3e6}.get(word, 2e6 / (word + 1))
 
     @property
     def multi_turn(self) -> bool:
-        """Whether positions go on beyond one turn."""
+        """Returns whether the servo is in multi-turn mode."""
         return self.get(mx64.CW_ANGLE_LIMIT) == self.get(mx64.CCW_ANGLE_LIMIT) == mx64.MULTI_TURN_LIMIT
 
     def get(self, register: Register) -> int:
-        """Word of a register, unsigned."""
+        """Returns the unsigned value of a register."""
         return from_bytes(self._table[register.address : register.address + register.size])
 
     def set(self, register: Register, value: int) -> None:
-        """Sets a register without the checks of an instruction."""
+        """Sets a register without the checks of a WRITE instruction."""
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
         self._table[register.address : register.address + register.size] = data
 
     def power_cycle(self) -> None:
-        """Sets everything that is not in the EEPROM to its initial value, as a loss of power does."""
+        """Resets the registers outside the EEPROM, as after a loss of power."""
         eeprom = bytes(self._table[:EEPROM_END])
         self._reset()
         self._table[:EEPROM_END] = eeprom
         self.set(mx64.TORQUE_LIMIT, self.get(mx64.MAX_TORQUE))
-        self.errors, self._registered = ServoErrors.NONE, None
+        self.errors, self._registered_write = ServoErrors.NONE, None
 
     def shut_down(self, errors: ServoErrors) -> None:
-        """An error of the motor; when the shutdown register says so, the torque limit becomes 0."""
+        """Adds errors of the motor; errors in the shutdown register set the torque limit to 0."""
         self.errors |= errors
         if errors & self.get(mx64.SHUTDOWN):
             self.set(mx64.TORQUE_LIMIT, 0)
 
     def handle(self, instruction: Instruction) -> bytes:
-        """Carries out an instruction addressed to this servo or to all; returns the status packet, b"" for none."""
-        if not instruction.intact:
+        """Executes an instruction to this servo or to all servos; returns the status packet, b"" without a response."""
+        if not instruction.checksum_valid:
             return self._status(ServoErrors.CHECKSUM)
-        answer, errors = self._carry_out(instruction.kind, instruction.parameters)
-        if instruction.servo_id == BROADCAST or not self._answers(instruction.kind):
+        data, errors = self._execute(instruction.kind, instruction.parameters)
+        if instruction.servo_id == BROADCAST or not self._returns_status(instruction.kind):
             return b""
-        return self._status(errors, answer)
+        return self._status(errors, data)
 
-    def _carry_out(self, kind: int, data: bytes) -> tuple[bytes, ServoErrors]:
+    def _execute(self, kind: int, data: bytes) -> tuple[bytes, ServoErrors]:
         if kind == PING:
             return b"", ServoErrors.NONE
         if kind == READ:
-            if len(data) != 2 or sum(data) > TABLE_SIZE:
+            if len(data) != 2 or sum(data) > CONTROL_TABLE_SIZE:
                 return b"", ServoErrors.RANGE
             return bytes(self._table[data[0] : data[0] + data[1]]), ServoErrors.NONE
         if kind == WRITE:
             return b"", self._write(data) if len(data) > 1 else ServoErrors.RANGE
         if kind == REG_WRITE:
-            self._registered = data
+            self._registered_write = data
             self.set(mx64.REGISTERED, 1)
             return b"", ServoErrors.NONE
-        if kind == ACTION and self._registered is not None:
-            data, self._registered = self._registered, None
+        if kind == ACTION and self._registered_write is not None:
+            data, self._registered_write = self._registered_write, None
             self.set(mx64.REGISTERED, 0)
             return b"", self._write(data) if len(data) > 1 else ServoErrors.RANGE
         if kind == FACTORY_RESET:
@@ -213,13 +223,13 @@ class DynamixelServo:
         return b"", ServoErrors.INSTRUCTION
 
     def sync_write(self, parameters: bytes) -> None:
-        """Takes this servo's part of a SYNC WRITE."""
+        """Writes the data for this servo in the parameters of a SYNC WRITE."""
         address, size = parameters[0], parameters[1]
         for start in range(2, len(parameters) - size, size + 1):
             if parameters[start] == self.servo_id:
                 self._write(bytes([address]) + parameters[start + 1 : start + 1 + size])
 
-    def _answers(self, kind: int) -> bool:
+    def _returns_status(self, kind: int) -> bool:
         level = self.get(mx64.STATUS_RETURN_LEVEL)
         return kind == PING or level == 2 or (level == 1 and kind == READ)
 
@@ -227,16 +237,16 @@ class DynamixelServo:
         return packet(self.servo_id, int(errors | self.errors), data)
 
     def _write(self, parameters: bytes) -> ServoErrors:
-        """Writes bytes, parameters[0] being the address; all or nothing."""
+        """Writes data at the address in parameters[0]; with an error, all registers keep their values."""
         address, data = parameters[0], parameters[1:]
         addresses = range(address, address + len(data))
-        if addresses.stop > TABLE_SIZE or READ_ONLY & set(addresses):
+        if addresses.stop > CONTROL_TABLE_SIZE or READ_ONLY & set(addresses):
             return ServoErrors.RANGE
         if addresses.start < EEPROM_END and self.get(mx64.LOCK):
             return ServoErrors.RANGE
         before = bytes(self._table)
         self._table[addresses.start : addresses.stop] = data
-        errors = self._faults(frozenset(addresses))
+        errors = self._value_errors(frozenset(addresses))
         if errors:
             self._table[:] = before
             return errors
@@ -246,17 +256,17 @@ class DynamixelServo:
             self.set(mx64.TORQUE_ENABLE, 1)
         return errors
 
-    def _faults(self, addresses: frozenset[int]) -> ServoErrors:
-        """Returns the errors of the words written at `addresses`."""
+    def _value_errors(self, addresses: frozenset[int]) -> ServoErrors:
+        """Returns the errors of the values written at `addresses`."""
         errors = ServoErrors.NONE
-        for register, largest in LARGEST.items():
-            if register.address in addresses and self.get(register) > largest:
+        for register, max_value in MAX_VALUES.items():
+            if register.address in addresses and self.get(register) > max_value:
                 errors |= ServoErrors.RANGE
-        if mx64.GOAL_POSITION.address in addresses and not self._goal_allowed():
+        if mx64.GOAL_POSITION.address in addresses and not self._is_goal_allowed():
             errors |= ServoErrors.ANGLE_LIMIT
         return errors
 
-    def _goal_allowed(self) -> bool:
+    def _is_goal_allowed(self) -> bool:
         goal = self.get(mx64.GOAL_POSITION)
         if self.multi_turn:
             return abs(mx64.signed(goal)) <= POSITION_RANGE
@@ -264,24 +274,24 @@ class DynamixelServo:
         return low <= goal <= high or low == high == 0
 
 
-def answer_bus(servos: Iterable[DynamixelServo], instruction: Instruction) -> bytes:
-    """Returns the answers of the servos of one line to an instruction, one after the other."""
-    listed = list(servos)
+def bus_response(servos: Iterable[DynamixelServo], instruction: Instruction) -> bytes:
+    """Returns the status packets of the servos on a line for an instruction, in the order of the servos."""
+    all_servos = list(servos)
     if instruction.kind == SYNC_WRITE and instruction.servo_id == BROADCAST:
-        if instruction.intact and len(instruction.parameters) > 2:
-            for servo in listed:
+        if instruction.checksum_valid and len(instruction.parameters) > 2:
+            for servo in all_servos:
                 servo.sync_write(instruction.parameters)
         return b""
     if instruction.kind == BULK_READ and instruction.servo_id == BROADCAST:
-        return b"".join(_bulk_answers(listed, instruction))
-    asked = [servo for servo in listed if instruction.servo_id in (servo.servo_id, BROADCAST)]
-    return b"".join([servo.handle(instruction) for servo in asked])
+        return b"".join(_bulk_read_responses(all_servos, instruction))
+    addressed = [servo for servo in all_servos if instruction.servo_id in (servo.servo_id, BROADCAST)]
+    return b"".join([servo.handle(instruction) for servo in addressed])
 
 
-def _bulk_answers(servos: list[DynamixelServo], instruction: Instruction) -> Iterator[bytes]:
-    wanted = instruction.parameters[1:]
-    for start in range(0, len(wanted) - 2, 3):
-        size, servo_id, address = wanted[start : start + 3]
+def _bulk_read_responses(servos: list[DynamixelServo], instruction: Instruction) -> Iterator[bytes]:
+    requests = instruction.parameters[1:]
+    for start in range(0, len(requests) - 2, 3):
+        size, servo_id, address = requests[start : start + 3]
         for servo in servos:
             if servo.servo_id == servo_id:
-                yield servo.handle(Instruction(servo_id, READ, bytes([address, size]), instruction.intact))
+                yield servo.handle(Instruction(servo_id, READ, bytes([address, size]), instruction.checksum_valid))

@@ -93,7 +93,7 @@ class ArmMotion:
     def step(self, dt_s: float, speed_fraction: float) -> None:
         """Advances by `dt_s` [s]; `speed_fraction` in [0, 1] scales the maximum speed, like the speed slider."""
         command = self.command
-        wanted = self._wanted_velocities(command, dt_s)
+        wanted = self._target_velocities(command, dt_s)
         limit = command.acceleration if command.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION
         change = min(limit, MAX_ACCELERATION) * dt_s
         top = MAX_VELOCITY * speed_fraction
@@ -103,7 +103,7 @@ class ArmMotion:
             self.velocities[joint] = velocity
             self.positions[joint] += velocity * dt_s
 
-    def _wanted_velocities(self, command: MotionCommand, dt_s: float) -> Sequence[float]:
+    def _target_velocities(self, command: MotionCommand, dt_s: float) -> Sequence[float]:
         match command.drive:
             case Drive.HOLD | Drive.STOP:
                 return (0.0,) * JOINTS

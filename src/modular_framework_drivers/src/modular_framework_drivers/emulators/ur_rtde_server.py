@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The controller's side of the real-time data exchange (RTDE), protocol version 2, for one client.
+"""Emulates the server of the Real-Time Data Exchange (RTDE), protocol version 2.
 
-Packages are a length of two bytes, a type of one and a payload, big-endian; a client sets up recipes (lists of
-variables), and data packages hold the values of a recipe after its number.
+A package consists of its length (2 bytes), its type (1 byte) and a payload, in big-endian order. A client sets up
+recipes, which are lists of variables. A data package contains the number of a recipe and the values of its variables.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from modular_framework_drivers.emulators.ur_motion import flange_pose
 _PROTOCOL, _VERSION, _DATA = ord("V"), ord("v"), ord("U")
 _OUTPUTS, _INPUTS, _START, _PAUSE = ord("O"), ord("I"), ord("S"), ord("P")
 _HEADER = struct.Struct(">HB")
-_OLD = (3, 3, 0, 0)
+_OLD_VERSION = (3, 3, 0, 0)
 REFUSALS = ("", "protocol", "version")
 _FORMATS = {
     "DOUBLE": "d",
@@ -35,17 +35,17 @@ Value = float | Sequence[float]
 
 
 class RtdeProtocolError(ValueError):
-    """A client violated the protocol; its connection is to be closed."""
+    """Raised if a client violates the protocol, which closes the connection."""
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of RTDE.
+    """Variable of RTDE.
 
     Attributes:
-        type_name: as in the answers to set-ups.
-        get: its value, for outputs.
-        set: takes a value, for inputs.
+        type_name: Type in responses to setup requests.
+        get: Getter of an output.
+        set: Setter of an input.
     """
 
     type_name: str
@@ -81,11 +81,11 @@ _UNMODELLED_OUTPUTS: dict[str, tuple[str, Value]] = {
         ("DOUBLE", 0.0),
     ),
 }
-"""Type and value of the variables that this emulator does not model."""
+"""Types and constant values of the variables that the emulator does not model."""
 
 
 def output_variables(controller: UrController) -> dict[str, Variable]:
-    """The variables a client can ask for, by name."""
+    """Returns the variables that clients can read, by name."""
     motion = controller.motion
     values: dict[str, tuple[str, Callable[[], Value]]] = {
         "timestamp": ("DOUBLE", lambda: controller.time_s),
@@ -125,7 +125,7 @@ def output_variables(controller: UrController) -> dict[str, Variable]:
 
 
 def input_variables(controller: UrController) -> dict[str, Variable]:
-    """The variables a client can set, by name."""
+    """Returns the variables that clients can set, by name."""
 
     def set_slider(value: Value) -> None:
         controller.speed_slider = min(max(float(value), 0.0), 1.0)  # type: ignore[arg-type]
@@ -165,11 +165,11 @@ def _setter(values: list[Any], index: int) -> Callable[[Value], None]:
 
 
 class Recipe:
-    """The variables of one data package.
+    """Packs and unpacks the variables of a data package.
 
     Args:
-        number: of the recipe.
-        variables: in the order of the package.
+        number: Number of the recipe.
+        variables: Variables in the order of the package.
     """
 
     def __init__(self, number: int, variables: Sequence[Variable]) -> None:
@@ -178,7 +178,7 @@ class Recipe:
         self._header = struct.pack(">HBB", 4 + self._codec.size, _DATA, number)
 
     def package(self) -> bytes:
-        """The data package with the values of now."""
+        """Returns a data package with the current values."""
         values: list[float] = []
         for variable in self._variables:
             value = variable.get() if variable.get is not None else 0.0
@@ -188,14 +188,16 @@ class Recipe:
                 values.append(value)  # type: ignore[arg-type]
         return self._header + self._codec.pack(*values)
 
-    def take(self, payload: bytes) -> None:
-        """Sets the variables to the values of a package (without its header and number).
+    def unpack(self, payload: bytes) -> None:
+        """Sets the variables to the values in a package, without header and recipe number.
 
         Raises:
-            RtdeProtocolError: it is of another length.
+            RtdeProtocolError: The package has the wrong length.
         """
         if len(payload) != self._codec.size:
-            raise RtdeProtocolError(f"data package of {len(payload)} bytes; its recipe has {self._codec.size}")
+            raise RtdeProtocolError(
+                f"data package has {len(payload)} bytes; expected {self._codec.size} bytes for the recipe"
+            )
         values = self._codec.unpack(payload)
         start = 0
         for variable in self._variables:
@@ -206,13 +208,16 @@ class Recipe:
 
 
 class RtdeServer:
-    """The state that all clients share: the variables, and which client sets which input.
+    """Shared state of all clients.
 
     Args:
-        controller: whose variables they are.
+        controller: Controller with the values of the variables.
 
     Attributes:
-        refusal: one of `REFUSALS`: which request of a client is refused, or answered with an old version.
+        outputs: Variables that clients can read, by name.
+        inputs: Variables that clients can set, by name.
+        owners: Client that sets an input, by name of the input.
+        refusal: One of `REFUSALS`: "protocol" refuses the protocol version, "version" reports an old software version.
     """
 
     def __init__(self, controller: UrController) -> None:
@@ -224,10 +229,10 @@ class RtdeServer:
 
 
 class RtdeSession:
-    """One client.
+    """Handles the requests of one client.
 
     Args:
-        server: what it is a client of.
+        server: Shared state of all clients.
     """
 
     def __init__(self, server: RtdeServer) -> None:
@@ -235,13 +240,13 @@ class RtdeSession:
         self._buffer = b""
         self._inputs: dict[int, Recipe] = {}
         self._output: Recipe | None = None
-        self._every = 1
+        self._cycles_per_package = 1
         self._cycles = 0
         self._started = False
-        self._answers: dict[int, Callable[[bytes], bytes]] = {
+        self._handlers: dict[int, Callable[[bytes], bytes]] = {
             _PROTOCOL: lambda payload: bytes([payload[-1:] == b"\x02" and server.refusal != "protocol"]),
             _VERSION: lambda _: struct.pack(
-                ">4I", *(_OLD if server.refusal == "version" else server.controller.model.version)
+                ">4I", *(_OLD_VERSION if server.refusal == "version" else server.controller.model.version)
             ),
             _OUTPUTS: self._set_up_outputs,
             _INPUTS: self._set_up_inputs,
@@ -250,56 +255,56 @@ class RtdeSession:
         }
 
     def receive(self, data: bytes) -> bytes:
-        """Returns the answer to received bytes.
+        """Returns the response to received bytes.
 
         Raises:
-            RtdeProtocolError: it is no RTDE.
+            RtdeProtocolError: The bytes are not a valid package.
         """
         self._buffer += data
         replies = b""
         while len(self._buffer) >= _HEADER.size:
             size, kind = _HEADER.unpack_from(self._buffer)
-            if size < _HEADER.size or (kind not in self._answers and kind != _DATA):
-                raise RtdeProtocolError(f"package of type {kind} and length {size}")
+            if size < _HEADER.size or (kind not in self._handlers and kind != _DATA):
+                raise RtdeProtocolError(f"package has the unknown type {kind} or the invalid length {size}")
             if len(self._buffer) < size:
                 break
             payload, self._buffer = self._buffer[_HEADER.size : size], self._buffer[size:]
             if kind == _DATA:
-                self._take(payload)
+                self._set_inputs(payload)
                 continue
-            reply = self._answers[kind](payload)
+            reply = self._handlers[kind](payload)
             replies += _HEADER.pack(_HEADER.size + len(reply), kind) + reply
         return replies
 
     def cycle(self) -> bytes:
-        """The data package of this cycle; empty when the client wants none."""
+        """Returns the data package of this cycle; empty without a data package."""
         if not self._started or self._output is None:
             return b""
         self._cycles += 1
-        return self._output.package() if self._cycles % self._every == 0 else b""
+        return self._output.package() if self._cycles % self._cycles_per_package == 0 else b""
 
     def close(self) -> None:
-        """Gives back the inputs this client set."""
+        """Releases the inputs of this client."""
         for name in [name for name, owner in self._server.owners.items() if owner is self]:
             del self._server.owners[name]
 
-    def _take(self, payload: bytes) -> None:
+    def _set_inputs(self, payload: bytes) -> None:
         recipe = self._inputs.get(payload[0]) if payload else None
         if recipe is None:
-            raise RtdeProtocolError(f"data package of the unknown recipe {payload[:1].hex() or 'none'}")
-        recipe.take(payload[1:])
+            raise RtdeProtocolError(f"data package has the unknown recipe {payload[:1].hex() or 'none'}")
+        recipe.unpack(payload[1:])
 
     def _set_up_outputs(self, payload: bytes) -> bytes:
         if len(payload) < 8:
-            raise RtdeProtocolError("set-up of outputs without a frequency")
+            raise RtdeProtocolError("setup request of outputs has no frequency")
         (frequency,) = struct.unpack_from(">d", payload)
-        own = self._server.controller.model.frequency
-        self._every = max(1, round(own / frequency)) if frequency > 0.0 else 1
+        max_frequency = self._server.controller.model.frequency
+        self._cycles_per_package = max(1, round(max_frequency / frequency)) if frequency > 0.0 else 1
         names = _names(payload[8:])
-        found = [self._server.outputs.get(name) for name in names]
-        if all(variable is not None for variable in found):
-            self._output = Recipe(1, [variable for variable in found if variable is not None])
-        return b"\x01" + ",".join(variable.type_name if variable else "NOT_FOUND" for variable in found).encode()
+        variables = [self._server.outputs.get(name) for name in names]
+        if all(variable is not None for variable in variables):
+            self._output = Recipe(1, [variable for variable in variables if variable is not None])
+        return b"\x01" + ",".join(variable.type_name if variable else "NOT_FOUND" for variable in variables).encode()
 
     def _set_up_inputs(self, payload: bytes) -> bytes:
         number = len(self._inputs) + 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The network side of the emulated controller: ports, connections, and their faults."""
+"""Serves the ports of the emulated controller, with injected network faults."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from dataclasses import dataclass
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 _HEADER_BYTES = 4  # length, type and recipe of a data package
-_MAX_WAITING = 2_000  # packages that may wait for a client that does not read
+_MAX_QUEUED_PACKAGES = 2_000  # maximum number of packages that wait for a client
 
 
 @dataclass(slots=True)
-class LinkFaults:
-    """The present faults of the network.
+class NetworkFaults:
+    """Injected faults of the network.
 
     Attributes:
-        frozen: nothing gets through in either direction, though all connections stay open.
-        delay_s: how late everything the controller sends arrives [s].
-        lose_every: every n-th data package is lost; 0 for none.
-        corrupt_every: every n-th data package has flipped bits; 0 for none.
+        frozen: Whether no data is transmitted in either direction while the connections stay open.
+        delay_s: Delay of all data sent by the controller [s].
+        lose_every: n, if every n-th data package is lost; 0 for no losses.
+        corrupt_every: n, if every n-th data package has flipped bits; 0 for no flipped bits.
     """
 
     frozen: bool = False
@@ -34,13 +34,13 @@ class LinkFaults:
 
 
 class Session:
-    """The functions that serve one connection of a port; they may raise ValueError to have it closed.
+    """Callbacks for one connection; a ValueError in a callback closes the connection.
 
     Args:
-        receive: returns the answer to received bytes.
-        cycle: returns the data to send in each cycle.
-        close: called when the connection is gone.
-        greeting: sent at once.
+        receive: Returns the response to received bytes.
+        cycle: Returns the data to send in each cycle.
+        close: Called after the connection was closed.
+        greeting: Data that is sent after the connection was accepted.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Session:
 
 
 class _Connection:
-    """One connection, with the bytes that wait to be sent and when."""
+    """Connection with its queue of data, by the time to send."""
 
     __slots__ = ("socket", "session", "waiting", "packages")
 
@@ -68,16 +68,19 @@ class _Connection:
         self.packages = 0
 
 
-class Links:
-    """All ports and connections of the controller; everything runs on the caller's thread and never blocks.
+class PortServer:
+    """Serves all ports and connections of the controller on the caller's thread without blocking.
 
     Args:
-        address: where to listen.
-        ports: makes the session of a new connection, by port.
+        address: IP address of the ports.
+        ports: Factories of the session of a new connection, by port.
+
+    Attributes:
+        faults: Current faults of the network.
     """
 
     def __init__(self, address: str, ports: Mapping[int, Callable[[], Session]]) -> None:
-        self.faults = LinkFaults()
+        self.faults = NetworkFaults()
         self._address = address
         self._ports = dict(ports)
         self._selector = selectors.DefaultSelector()
@@ -85,10 +88,10 @@ class Links:
         self._connections: list[_Connection] = []
 
     def connect(self) -> None:
-        """Listens at all ports; nothing happens when that is already so.
+        """Opens all ports, unless the ports are already open.
 
         Raises:
-            OSError: a port is taken; the text names it.
+            OSError: A port is in use; the text names the port.
         """
         if self._listeners:
             return
@@ -103,8 +106,8 @@ class Links:
                 self.close()
                 raise OSError(
                     error.errno,
-                    f"port {self._address}:{port}: {error.strerror}; does another emulator run "
-                    "there? Choose another address, for example 127.0.0.2",
+                    f"port {self._address}:{port}: {error.strerror}; stop the program that uses the port, or "
+                    "choose another address, for example 127.0.0.2",
                 ) from error
             listener.listen()
             self._selector.register(listener, selectors.EVENT_READ, make_session)
@@ -112,7 +115,7 @@ class Links:
     def close(self) -> None:
         """Closes all connections and ports; may be called twice."""
         for connection in list(self._connections):
-            self._drop(connection)
+            self._close_connection(connection)
         while self._listeners:
             listener = self._listeners.pop()
             if listener in self._selector.get_map():
@@ -148,7 +151,7 @@ class Links:
             self._flush(connection, now_s)
 
     def send_to_all(self, data: bytes, now_s: float) -> None:
-        """Sends bytes on every connection that gets data packages."""
+        """Sends bytes to every client that receives data packages."""
         for connection in list(self._connections):
             if connection.session.cycle is not None:
                 self._queue(connection, data, now_s)
@@ -156,7 +159,7 @@ class Links:
 
     @property
     def connections(self) -> int:
-        """Number of open connections."""
+        """Returns the number of open connections."""
         return len(self._connections)
 
     def _accept(self, key: selectors.SelectorKey, now_s: float) -> None:
@@ -177,19 +180,19 @@ class Links:
         except BlockingIOError:
             return
         except ValueError as error:
-            LOGGER.warning("a connection is closed: %s", error)
-            self._drop(connection)
+            LOGGER.warning("closed a connection: %s", error)
+            self._close_connection(connection)
             return
         except OSError:
             data = b""
         if not data:
-            self._drop(connection)
+            self._close_connection(connection)
         elif reply:
             self._queue(connection, reply, now_s)
             self._flush(connection, now_s)
 
     def _queue(self, connection: _Connection, data: bytes, now_s: float) -> None:
-        if len(connection.waiting) < _MAX_WAITING:
+        if len(connection.waiting) < _MAX_QUEUED_PACKAGES:
             connection.waiting.append((now_s + self.faults.delay_s, data))
 
     def _flush(self, connection: _Connection, now_s: float) -> None:
@@ -200,13 +203,13 @@ class Links:
             except BlockingIOError:
                 sent = 0
             except OSError:
-                self._drop(connection)
+                self._close_connection(connection)
                 return
             if sent < len(data):
                 connection.waiting.appendleft((due_s, data[sent:]))
                 return
 
-    def _drop(self, connection: _Connection) -> None:
+    def _close_connection(self, connection: _Connection) -> None:
         if connection not in self._connections:
             return
         self._connections.remove(connection)
@@ -217,7 +220,7 @@ class Links:
 
 
 def _with_flipped_bits(package: bytes) -> bytes:
-    """The package with a random bit flipped in each word of eight bytes after its header."""
+    """Returns the package with a random flipped bit in each 8 bytes after the header."""
     damaged = bytearray(package)
     for start in range(_HEADER_BYTES, len(package), 8):
         damaged[random.randrange(start, min(start + 8, len(package)))] ^= 1 << random.randrange(8)
