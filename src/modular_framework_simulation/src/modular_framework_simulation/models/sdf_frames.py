@@ -96,8 +96,8 @@ class FrameTree:
     def _base_of(self, pose: XmlNode) -> str:
         """Returns the base frame of a pose; empty if the attribute `frame` of an old file names an unknown frame."""
         base, outer = base_of(pose), base_of(pose).partition(SCOPE)[0]
-        known = {"", MODEL_FRAME, *self._nodes, *self._joints, *self._inner}
-        return base if "relative_to" in pose.attributes or outer in known else ""
+        known = outer in ("", MODEL_FRAME) or any(outer in names for names in (self._nodes, self._joints, self._inner))
+        return base if known or "relative_to" in pose.attributes else ""
 
     def pose_in_model(self, name: str) -> Pose:
         """Returns the pose of a link, frame, joint or inner model in the model frame.
