@@ -111,6 +111,7 @@ class PyBulletEngine(PhysicsEngine):
         self._rest = Rest(self.api, self.client, settings)
         self._impossible_moments: dict[int, dict[int, list[float]]] = {}  # by body and link
         self._free_masses: dict[int, float] = {}  # of bodies without joints [kg]
+        self._iterations_fit = True  # to the masses; fitted before a step, not for each of many new bodies
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)
@@ -149,6 +150,7 @@ class PyBulletEngine(PhysicsEngine):
         return max(minimum, min(round(_ITERATIONS_PER_RATIO * ratio), _MAX_ITERATIONS))
 
     def _fit_iterations(self) -> None:
+        self._iterations_fit = True
         self.api.setPhysicsEngineParameter(numSolverIterations=self._solver_iterations(), physicsClientId=self.client)
 
     def _configure(self, gravity: Vector3) -> None:
@@ -216,7 +218,7 @@ class PyBulletEngine(PhysicsEngine):
         mass: float = self.api.getDynamicsInfo(body, BASE_INDEX, physicsClientId=self.client)[0]
         if not fixed and not has_joints and mass > 0.0:
             self._free_masses[body] = mass
-            self._fit_iterations()
+            self._iterations_fit = False
         return body
 
     def _set_dropped_moments(self, body: int, text: str) -> None:
@@ -241,6 +243,8 @@ class PyBulletEngine(PhysicsEngine):
 
     def step(self) -> None:
         """Advances the physics by one time step."""
+        if not self._iterations_fit:
+            self._fit_iterations()
         self.api.stepSimulation(physicsClientId=self.client)
         self._rest.after_step()
 
@@ -284,7 +288,7 @@ class PyBulletEngine(PhysicsEngine):
         self._impossible_moments.pop(number, None)
         self.api.removeBody(number, physicsClientId=self.client)
         if self._free_masses.pop(number, None) is not None:
-            self._fit_iterations()
+            self._iterations_fit = False
 
     def root_link(self, number: int) -> str:
         """Returns the name of the root link."""
