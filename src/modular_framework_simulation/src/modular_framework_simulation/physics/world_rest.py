@@ -43,7 +43,10 @@ class WorldRest:
         """
         self._steps += 1
         if self._was_still or self._steps % round(_LOOK_S / self._engine.settings.time_step_s) == 0:
-            still = not any(self._moves(part) for body in bodies for part in body.parts)
+            resting = self._engine.resting()
+            parts = [part for body in bodies for part in body.parts]
+            parts.sort(key=lambda part: part.number in resting)  # what moves is found first
+            still = not any(map(self._moves, parts))
             self.holds = still and self._was_still
             self._was_still = still
 
