@@ -54,7 +54,13 @@ class Rest:
         self.wake_all()
 
     def add(self, body: int, fixed: bool, has_joints: bool) -> None:
-        """Says what a new body is like."""
+        """Adds a new body.
+
+        Args:
+            body: Number of the body in the engine.
+            fixed: Whether the body is fixed to the world.
+            has_joints: Whether the body has joints; such a body never rests.
+        """
         if has_joints:
             self._jointed.append(body)
         elif self._settings.rest_speed > 0.0 and fixed:
