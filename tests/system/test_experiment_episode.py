@@ -10,8 +10,8 @@ import time
 import uuid
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -20,18 +20,20 @@ import rosgraph
 from ros_session import processes_with
 
 from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
+from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
 from modular_framework_benchmark.metrics.registry import METRICS
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import PlacedObject, RecordedFiles
 
 MARK = "EPISODE_TEST"
 ENOUGH_S = 240.0
-PICK: dict[str, Any] = {
-    "arguments": {"world_file": "ur5_table.world", "real_time_factor": 0},
-    "objects": [{"name": "cube_1", "model": "cube", "x": 0.05, "y": 0.5, "z": 0.866, "yaw": 0.3}],
-    "success": {"lifted": 0.1, "hold_time": 1.0, "shake": 2.0},
-    "metrics": list(METRICS),
-    "time_limit": ENOUGH_S,
-}
+PICK = TaskSettings(
+    arguments={"world_file": "ur5_table.world", "real_time_factor": "0"},
+    objects=(PlacedObject("cube_1", "cube", 0.05, 0.5, 0.866, yaw=0.3),),
+    success=SuccessCriteria(lifted=0.1, hold_time=1.0, shake=2.0),
+    metrics=tuple(METRICS),
+    time_limit=ENOUGH_S,
+)
 
 
 @pytest.fixture
@@ -47,7 +49,7 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> Iterator[TaskEpisodeRunner]:
         assert processes_with(MARK, mark) == []
 
 
-def run(runner: TaskEpisodeRunner, folder: Path, settings: dict[str, Any]) -> EpisodeRecord:
+def run(runner: TaskEpisodeRunner, folder: Path, settings: TaskSettings) -> EpisodeRecord:
     folder.mkdir()
     return runner.run(EpisodeSpec(0, {"object": "cube"}, 0, 7, settings), folder)
 
@@ -71,8 +73,8 @@ def _process_in_task(node: str) -> int:
 def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_stack_that_is_kept(
     runner: TaskEpisodeRunner, tmp_path: Path
 ) -> None:
-    enough_for_two_runs = {"time_limit": 2.0 * ENOUGH_S}
-    cold = run(runner, tmp_path / "cold", PICK | enough_for_two_runs | {"record": {"bag": True, "video": True}})
+    enough_for_two_runs = replace(PICK, time_limit=2.0 * ENOUGH_S)
+    cold = run(runner, tmp_path / "cold", replace(enough_for_two_runs, record=RecordedFiles(bag=True, video=True)))
     warm = run(runner, tmp_path / "warm", PICK)
     assert cold.status is EpisodeStatus.SUCCEEDED, f"{cold.cause}\n{(tmp_path / 'cold/log.txt').read_text()}"
     assert cold.outcome == "successful_pipeline" and cold.simulated_s is not None
@@ -111,9 +113,8 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
 
 def test_a_launch_that_dies_is_an_episode_with_its_cause_at_once(runner: TaskEpisodeRunner, tmp_path: Path) -> None:
     begun = time.monotonic()
-    record = run(
-        runner, tmp_path / "dead", PICK | {"arguments": {"world_file": "../../../tests/system/nameless_link.world"}}
-    )
+    arguments = {"world_file": "../../../tests/system/nameless_link.world"}
+    record = run(runner, tmp_path / "dead", replace(PICK, arguments=arguments))
     assert record.status is EpisodeStatus.BROKEN
     assert "node 'gazebo' died (exited with 1)" in record.cause and "nameless_link.world:4" in record.cause
     assert time.monotonic() - begun < ENOUGH_S
@@ -140,13 +141,13 @@ def test_a_frozen_node_makes_the_episode_invalid_and_is_named(
 def test_a_time_limit_that_passes_before_the_method_is_asked_says_nothing_of_the_method(
     runner: TaskEpisodeRunner, tmp_path: Path
 ) -> None:
-    record = run(runner, tmp_path / "short", PICK | {"time_limit": 1.0})
+    record = run(runner, tmp_path / "short", replace(PICK, time_limit=1.0))
     assert record.status is EpisodeStatus.BROKEN
     assert record.cause.startswith("no end within 1 s")
 
 
 def test_a_setting_that_is_wrong_is_named_and_nothing_is_launched(runner: TaskEpisodeRunner, tmp_path: Path) -> None:
-    record = run(runner, tmp_path / "wrong", PICK | {"arguments": {"world_fil": "ur5_table.world"}})
+    record = run(runner, tmp_path / "wrong", replace(PICK, arguments={"world_fil": "ur5_table.world"}))
     assert record.status is EpisodeStatus.BROKEN
     assert "unknown argument 'world_fil'; did you mean 'world_file'" in record.cause
     assert not any((tmp_path / "wrong").iterdir())

@@ -15,7 +15,7 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 def record_of(spec: EpisodeSpec, status: EpisodeStatus = EpisodeStatus.SUCCEEDED, cause: str = "") -> EpisodeRecord:
     """Returns a record whose values follow from the episode alone."""
     known = {"success": 1.0, "task_time": spec.seed % 1000 / 1000}
-    metrics = {name: known[name] for name in spec.settings["metrics"]}
+    metrics = {name: known[name] for name in spec.settings.metric_names}
     return EpisodeRecord(spec, status, "", cause, time.time(), 0.01, 1.0, metrics)
 
 

@@ -18,13 +18,12 @@ import roslaunch.rlutil
 import rospkg
 import yaml
 
-from modular_framework_benchmark.commands.mode_runners import known_metrics
+from modular_framework_benchmark.commands.mode_runners import known_metrics, setting_checks
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults
 from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
-from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 from modular_framework_core.launching.launch_arguments import check_arguments
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
 from modular_framework_core.task_constructor import pipeline

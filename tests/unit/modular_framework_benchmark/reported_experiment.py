@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import (
     Direction,
@@ -105,7 +106,7 @@ class ReportedExperiment:
         ]
         return [
             EpisodeSpec(
-                number, {"motion_planner": planner, "object": item}, trial, self._seed_of(trial, item), {"object": item}
+                number, {"motion_planner": planner, "object": item}, trial, self._seed_of(trial, item), TaskSettings()
             )
             for number, (planner, item, trial) in enumerate(keys)
         ]

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import itertools
 
+from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.episode_settings import OwnMetric, PlacedObject
 from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind
 
 METHODS = ("top_down", "antipodal")
@@ -38,7 +40,13 @@ def sample_episodes(trials: int = 3) -> list[EpisodeSpec]:
             {"grasp_method": method, "object": thing, "speed": "0.50"},
             trial,
             1000 + trial,
-            {"grasp_method": method, "world": {"object": thing, "pose": [0.1, 0.2 + trial, 0.3]}, "speed": 0.5},
+            TaskSettings(
+                arguments={"grasp_method": method},
+                parameters={"/speed": 0.5},
+                objects=(PlacedObject(thing, thing, 0.1, 0.2 + trial, 0.3),),
+                success=SuccessCriteria(lifted=0.2),
+                metrics=("planning_time", OwnMetric("slipped", "/own.py:slipped")),
+            ),
         )
         for number, (trial, method, thing) in enumerate(design)
     ]

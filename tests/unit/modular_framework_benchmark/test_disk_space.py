@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,8 +16,10 @@ from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.commands.prune_command import main as prune
 from modular_framework_benchmark.experiments.design import plan_episodes
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.ros_disk_estimate import disk_text, size_text
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import RecordedFiles
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 from modular_framework_benchmark.scheduling.disk_guard import DiskGuard, tree_size
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun
@@ -99,12 +102,12 @@ wrist: {frame_id: lens, data_topics: {rgb_topic: a, depth_map_topic: b, pointclo
   camera: {width: 320, height: 240, rate: 5}}
 </rosparam></launch>"""
     )
-    settings = {"launch": str(launch), "record": {"bag": True}}
-    text = disk_text("task", [EpisodeSpec(number, {}, number, 1, settings) for number in range(3)])
+    settings = TaskSettings(launch=str(launch), record=RecordedFiles(bag=True))
+    text = disk_text([EpisodeSpec(number, {}, number, 1, settings) for number in range(3)])
     image_bytes = 320 * 240 * (3 + 4 + 16)
     assert f"camera 'wrist' in bags at most (320 x 240 at 5 Hz) {size_text(3 * 50 * image_bytes)}" in text
     assert text.startswith("  disk: about 279 MB for 3 episodes, each 10 s of simulated time")
-    without = disk_text("task", [EpisodeSpec(0, {}, 0, 1, {**settings, "record": {"bag": False}})])
+    without = disk_text([EpisodeSpec(0, {}, 0, 1, replace(settings, record=RecordedFiles()))])
     assert "wrist" not in without and "disk: about 580 kB for 1 episodes" in without
 
 

@@ -3,50 +3,43 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import roslaunch.config
 
 from modular_framework_benchmark.episodes.episode_video import make_video, make_video_apart
-from modular_framework_benchmark.episodes.errors import SettingsError, VideoError
+from modular_framework_benchmark.episodes.errors import VideoError
+from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.shake_motion import shake_motion
 from modular_framework_benchmark.episodes.stack import write_parameters
-from modular_framework_benchmark.episodes.task_settings import SuccessCriteria, read_settings
-from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
+from modular_framework_benchmark.records.episode_settings import PlacedObject, SettingsError
+
+CAN = PlacedObject("can_1", "can", 1.0, 2.0, 3.0)
 
 
-def spec(**settings: Any) -> EpisodeSpec:
-    return EpisodeSpec(0, {}, 0, 1, settings)
+def test_success_is_about_the_first_object_and_without_criteria_about_the_task_alone() -> None:
+    settings = TaskSettings(objects=(CAN,), success=SuccessCriteria(lifted=0.2))
+    assert settings.judged_object == "can_1"
+    assert (settings.success.lifted_m, settings.success.hold_s) == (0.2, 2.0)
+    assert replace(settings, success=SuccessCriteria(object="cup")).judged_object == "cup"
+    assert TaskSettings(objects=(CAN,)).judged_object == ""
+    with pytest.raises(SettingsError, match="names no object"):
+        _ = replace(settings, objects=()).judged_object
 
 
-def test_settings_have_defaults_and_success_is_about_the_first_object() -> None:
-    found = read_settings(spec(objects=[{"model": "can", "x": 1, "y": 2, "z": 3}], success={"lifted": 0.2}))
-    assert (found.package, found.launch_file) == ("modular_framework_api", "start_framework.launch")
-    assert found.objects[0].position == (1.0, 2.0, 3.0) and found.objects[0].rpy == (0.0, 0.0, 0.0)
-    assert found.success == SuccessCriteria("object_0", 0.2, 2.0)
-    assert read_settings(spec()).success.object == ""
-
-
-def test_a_task_is_an_argument_and_truths_are_written_as_roslaunch_reads_them() -> None:
-    found = read_settings(spec(task="mine.yaml", arguments={"simulation": True, "start_timeout": 5}))
-    assert found.arguments == {"task_constructor_script": "mine.yaml", "simulation": "true", "start_timeout": "5"}
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"launch": "nothing"}, "'launch' is 'nothing'; allowed: PACKAGE/FILE.launch"),
-        ({"objects": [{"model": "can", "x": 0}]}, "number 0: y, z is missing"),
-        ({"objects": [{"model": "can", "x": 0, "y": "a", "z": 0}]}, "could not convert"),
-        ({"success": {"lifted": 0.1}}, "names no object"),
-    ],
-)
-def test_wrong_settings_are_named(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(SettingsError, match=message):
-        read_settings(spec(**settings))
+def test_a_launch_file_has_a_package_or_is_a_path_and_the_task_is_an_argument(tmp_path: Path) -> None:
+    (tmp_path / "own.launch").write_text('<launch><arg name="task_constructor_script"/><arg name="speed"/></launch>')
+    settings = TaskSettings(launch=str(tmp_path / "own.launch"), task="simulation_pick.yaml", arguments={"speed": "5"})
+    found = resolve_launch(settings)
+    assert (found.package, found.launch_file) == ("", str(tmp_path / "own.launch"))
+    assert found.arguments == {"task_constructor_script": "simulation_pick.yaml", "speed": "5"}
+    assert resolve_launch(TaskSettings()).package == "modular_framework_api"
+    with pytest.raises(SettingsError, match="'launch' is 'nothing'; allowed: PACKAGE/FILE.launch"):
+        resolve_launch(TaskSettings(launch="nothing"))
 
 
 def test_parameters_of_an_episode_replace_those_of_the_launch_file_and_keep_their_types(tmp_path: Path) -> None:

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 
 from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.experiments.distributions import Choice, Normal, Uniform, generator_of
+from modular_framework_benchmark.experiments.modes import stored_settings
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import as_json
 
 
 def laid_out(text: str, folder: Path) -> tuple[list[EpisodeSpec], str]:
@@ -37,17 +39,17 @@ def test_the_methods_of_a_pair_have_the_same_scene_and_seed_and_other_pairs_othe
     assert len(pairs) == 24
     for first, second in pairs.values():
         assert {first.configuration["method"], second.configuration["method"]} == {"above", "aside"}
-        assert first.seed == second.seed and first.settings["objects"] == second.settings["objects"]
+        assert first.seed == second.seed and first.settings.objects == second.settings.objects
     assert len({pair[0].seed for pair in pairs.values()}) == 24
-    assert len({pair[0].settings["objects"][0]["x"] for pair in pairs.values()}) == 24
+    assert len({pair[0].settings.objects[0].x for pair in pairs.values()}) == 24
 
 
 def test_the_same_file_gives_the_same_episodes_and_digest_in_any_folder(tmp_path: Path) -> None:
     first, digest = laid_out(PICK, tmp_path / "one")
     second, again = laid_out("# a comment\n" + PICK, tmp_path / "two")
     assert digest == again
-    assert [(one.key, one.seed, one.settings["objects"]) for one in first] == [
-        (one.key, one.seed, one.settings["objects"]) for one in second
+    assert [(one.key, one.seed, one.settings.objects) for one in first] == [
+        (one.key, one.seed, one.settings.objects) for one in second
     ]
 
 
@@ -95,18 +97,20 @@ def test_episodes_that_can_share_a_stack_are_neighbours(tmp_path: Path) -> None:
             assert len(set(stacks[begin : begin + length])) == 1
 
 
-def test_the_settings_are_plain_json_values(tmp_path: Path) -> None:
+def test_the_settings_are_the_same_when_they_are_read_from_their_json_values(tmp_path: Path) -> None:
     for one in laid_out(PICK, tmp_path)[0]:
-        assert json.loads(json.dumps(one.settings)) == one.settings
+        content = json.loads(json.dumps(as_json(one.settings)))
+        assert stored_settings("task", content) == one.settings and as_json(one.settings) == content
+        assert content["objects"][0].keys() == {"name", "model", "x", "y", "z", "roll", "pitch", "yaw"}
+        assert content["success"] == {"lifted": 0.1}, "what the file does not say is not stored"
+        assert stored_settings("task", content | {"of_another_version": 1}) == one.settings
 
 
 def test_an_object_stands_on_its_surface_however_it_is_turned(tmp_path: Path) -> None:
     lying = PICK.replace("[cube, ball]", "[cube, ball, can]").replace("yaw: {normal: [0, 1]}", f"roll: {math.pi / 2}")
-    heights = {
-        one.settings["objects"][0]["model"]: one.settings["objects"][0]["z"] for one in laid_out(lying, tmp_path)[0]
-    }
+    heights = {one.settings.objects[0].model: one.settings.objects[0].z for one in laid_out(lying, tmp_path)[0]}
     assert heights == pytest.approx({"cube": 0.8 + 0.001 + 0.02, "ball": 0.8 + 0.001 + 0.05, "can": 0.8 + 0.001 + 0.02})
-    upright = {one.settings["objects"][0]["z"] for one in laid_out(PICK.replace("[cube, ball]", "[can]"), tmp_path)[0]}
+    upright = {one.settings.objects[0].z for one in laid_out(PICK.replace("[cube, ball]", "[can]"), tmp_path)[0]}
     assert upright == {0.851}
 
 

@@ -15,6 +15,7 @@ from modular_framework_benchmark.experiments.experiment_file import load_experim
 from modular_framework_benchmark.experiments.metric_choices import read_metrics
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.metrics.registry import METRICS
+from modular_framework_benchmark.records.episode_settings import OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, MetricKind
 from modular_framework_core.files.faults import FaultList
 
@@ -22,27 +23,27 @@ from modular_framework_core.files.faults import FaultList
 def test_every_combination_has_the_settings_of_the_base_and_of_its_levels(tmp_path: Path) -> None:
     experiment = read(PICK, tmp_path)
     assert len(experiment.combinations) == 8
-    found = {tuple(one.configuration.values()): one.settings for one in experiment.combinations}
-    settings = found["aside", "PRM", "ball"]
-    assert settings["arguments"] == {"world_file": "table.world", "method_launch_file": "b/aside.launch"}
-    assert settings["parameters"] == {"/planner_name": "PRM"}
-    assert settings["objects"][0].model == "ball"
-    assert settings["launch"] == "modular_framework_api/start_framework.launch"
+    found = {tuple(one.configuration.values()): one for one in experiment.combinations}
+    combination = found["aside", "PRM", "ball"]
+    settings = combination.settings
+    assert settings.arguments == {"world_file": "table.world", "method_launch_file": "b/aside.launch"}
+    assert settings.parameters == {"/planner_name": "PRM"}
+    assert combination.objects[0].model == "ball"
+    assert settings.launch == "modular_framework_api/start_framework.launch"
 
 
 def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
     text = PICK.replace("planner: [RRTConnect, PRM]", "planner: [0.5, true, 3, word]").replace(
         "{/planner_name: $planner}", "{/a: $planner, /b: with $planner and $$}"
     )
-    found = [one.settings["parameters"] for one in read(text, tmp_path).combinations[::2]][:4]
+    found = [one.settings.parameters for one in read(text, tmp_path).combinations[::2]][:4]
     assert [one["/a"] for one in found] == [0.5, True, 3, "word"]
     assert [one["/b"] for one in found] == ["with 0.5 and $", "with true and $", "with 3 and $", "with word and $"]
 
 
 def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_path: Path) -> None:
     def poses(text: str) -> list[object]:
-        settings = read(text, tmp_path).combinations[0].settings
-        return [item.sampled((1, 0), 0) for item in settings["objects"]]
+        return [item.sampled((1, 0), 0) for item in read(text, tmp_path).combinations[0].objects]
 
     expected = poses(PICK)
     assert poses(yaml.safe_dump(yaml.safe_load(PICK))) == expected
@@ -145,7 +146,7 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
     own = experiment.description.metrics[1]
     assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
-    assert experiment.metric_specs == ("success", {"name": "swing", "function": f"{tmp_path / 'mine.py'}:swing"})
+    assert experiment.metric_specs == ("success", OwnMetric("swing", f"{tmp_path / 'mine.py'}:swing"))
     assert (
         "'swng' is unknown; allowed: swing, two; did you mean 'swing'"
         in faults_of(PICK.replace("[success, task_time]", "[mine.py:swng]"), tmp_path)[0]
@@ -214,9 +215,9 @@ trials: 5
         for kind in ("scene", "request"):
             (tmp_path / "problems" / family / f"{kind}{number:04}.yaml").write_text("{}")
     episodes = plan_episodes(read(text, tmp_path))
-    names = {one.trial: one.settings["problem"]["name"] for one in episodes}
+    names = {one.trial: one.settings.problem.name for one in episodes}
     assert [names[trial] for trial in range(5)] == ["box/0001", "box/0002", "cage/0001", "box/0001", "box/0002"]
-    assert len({one.seed for one in episodes if one.settings["problem"]["name"] == "box/0001"}) == 2
+    assert len({one.seed for one in episodes if one.settings.problem.name == "box/0001"}) == 2
     (fault,) = faults_of(text + "stopping: {rule: sequential}\n", tmp_path)
     assert "a sequential rule needs a problem for each trial: 3 problems, 5 trials" in fault
     assert read(text.replace("trials: 5", "trials: 3") + "stopping: {rule: sequential}\n", tmp_path).trials == 3

@@ -10,6 +10,8 @@ import pytest
 from sample_experiment import sample_description, sample_episodes
 
 from modular_framework_benchmark.episodes.ros_stack_launch import loaded_stack
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.results.database import open_database
@@ -36,9 +38,10 @@ class Stack:
         self.launch.write_text(LAUNCH.format(world=self.world, poses=self.poses))
 
     def digests(self) -> dict[str, str]:
-        settings = {"launch": str(self.launch), "arguments": {"planner_configuration": str(self.configuration)}}
+        arguments = {"planner_configuration": str(self.configuration)}
+        settings = TaskSettings(launch=str(self.launch), arguments=arguments)
         loaded_stack.cache_clear()  # as in another process
-        return run_digests("task", [EpisodeSpec(0, {}, 0, 1, settings)])
+        return run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
 
 
 @pytest.fixture
@@ -104,7 +107,8 @@ def test_the_states_of_a_user_count(stack: Stack, tmp_path: Path) -> None:
         (states / "my_state.py").write_text(content)
         arguments = {"planner_configuration": str(stack.configuration), "states_directory": str(states)}
         loaded_stack.cache_clear()
-        digests = run_digests("task", [EpisodeSpec(0, {}, 0, 1, {"launch": str(stack.launch), "arguments": arguments})])
+        settings = TaskSettings(launch=str(stack.launch), arguments=arguments)
+        digests = run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
         found.append(digests["folder states_directory"])
     assert found[0] != found[1]
 
@@ -115,6 +119,7 @@ def test_packages_of_nodes_and_versions_of_libraries_count(stack: Stack) -> None
 
 
 def test_a_mode_without_launch_counts_its_robot_and_method() -> None:
-    settings = {"robot": "ur5_ezgripper_moveit_config", "method": "top_down_grasps.ros_top_down_node:TopDownMethod"}
-    digests = run_digests("grasps", [EpisodeSpec(0, {}, 0, 1, settings)])
+    method = "top_down_grasps.ros_top_down_node:TopDownMethod"
+    settings = GraspSettings(robot="ur5_ezgripper_moveit_config", method=method)
+    digests = run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
     assert {"package top_down_grasps", "package modular_framework_planning"} <= set(digests)

@@ -22,6 +22,7 @@ from modular_framework_benchmark.metrics.measurements import (
 )
 from modular_framework_benchmark.metrics.registry import METRICS, MetricError, find_metric, load_metric, measure
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, OwnMetric
 from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, PLANNING_TIME, REACHABLE, declared
 
 JOINTS = ("pan", "lift")
@@ -55,7 +56,7 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
     moving = (TIMES >= 1.0) & (TIMES <= 3.0)
     desired = positions + np.where(moving, 0.01, 5.0)[:, None] * np.array([1.0, -1.0])
     return EpisodeMeasurements(
-        settings={},
+        settings=EpisodeSettings(),
         status=status,
         states=(Span("state", "A", 0.0, 1.0, "fail", True, "because"), Span("state", "B", 1.0, 2.0, "success")),
         task_s=12.5,
@@ -153,7 +154,7 @@ def test_a_plan_that_was_made_to_see_whether_there_is_one_and_made_again_counts_
 
 
 def test_what_was_not_recorded_has_no_value_and_no_metric_raises() -> None:
-    nothing = EpisodeMeasurements(settings={}, status=EpisodeStatus.BROKEN)
+    nothing = EpisodeMeasurements(settings=EpisodeSettings(), status=EpisodeStatus.BROKEN)
     measured = measure(METRICS, nothing)
     assert measured.faults == {}
     assert all(value is None for value in measured.values.values()), measured.values
@@ -179,14 +180,14 @@ def test_an_unknown_metric_is_named_with_the_nearest_one() -> None:
 def test_a_users_metric_is_one_function_in_one_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text("def height(episode):\n    return episode.objects['can'].positions[-1, 2]\n")
-    measured = measure([f"{file}:height", {"function": f"{file}:height", "name": "z"}], episode())
+    measured = measure([OwnMetric("height", f"{file}:height"), OwnMetric("z", f"{file}:height")], episode())
     assert measured.values == pytest.approx({"height": 0.46, "z": 0.46})
 
 
 def test_a_users_metric_that_raises_costs_its_own_value_only(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text("def bad(episode):\n    return episode.nothing\n")
-    measured = measure([f"{file}:bad", "task_time"], episode())
+    measured = measure([OwnMetric("bad", f"{file}:bad"), "task_time"], episode())
     assert measured.values == {"bad": None, "task_time": 12.5}
     assert "AttributeError" in measured.faults["bad"]
 
@@ -211,5 +212,5 @@ def test_a_users_metric_that_cannot_be_loaded_is_explained(
 def test_a_value_that_is_no_number_is_a_fault(tmp_path: Path) -> None:
     file = tmp_path / "mine.py"
     file.write_text("def text(episode):\n    return 'much'\n")
-    assert "ValueError" in measure([f"{file}:text"], episode()).faults["text"]
+    assert "ValueError" in measure([OwnMetric("text", f"{file}:text")], episode()).faults["text"]
     assert math.isfinite(measure(["lift"], episode()).values["lift"] or math.nan)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +11,22 @@ import numpy as np
 import pytest
 from experiment_texts import FakeResources
 
-from modular_framework_benchmark.commands.mode_runners import RUNNERS, known_metrics, runner_factory
+from modular_framework_benchmark.commands.mode_runners import known_metrics, runner_factory
 from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
+from modular_framework_benchmark.experiments.modes import MODES
 from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 
 TOP_DOWN, ANTIPODAL = (
     "top_down_grasps.ros_top_down_node:TopDownMethod",
     "antipodal_grasps.ros_antipodal_node:AntipodalMethod",
 )
-METRICS = ["success", "generation_time", "candidates", "reachable_share", "best_rank"]
+METRICS = ("success", "generation_time", "candidates", "reachable_share", "best_rank")
 GRASPS = """
 experiment: grasps
 mode: grasps
@@ -47,26 +51,17 @@ def runner() -> GraspEpisodeRunner:
     return GraspEpisodeRunner()
 
 
-def at(name: str, file: Path, ahead: float, aside: float, above: float) -> dict[str, Any]:
+def at(name: str, file: Path, ahead: float, aside: float, above: float) -> PlacedObject:
     """Returns an object; the base of the robot is at z = 0.86 m, and it looks along y."""
-    return {
-        "name": name,
-        "model": str(file),
-        "x": aside,
-        "y": ahead,
-        "z": 0.86 + above,
-        "roll": 0.0,
-        "pitch": 0.0,
-        "yaw": 0.3,
-    }
+    return PlacedObject(name, str(file), aside, ahead, 0.86 + above, yaw=0.3)
 
 
-def generate(runner: GraspEpisodeRunner, folder: Path, objects: list[dict[str, Any]], **settings: Any) -> EpisodeRecord:
-    known = {
-        "robot": "panda_hand_moveit_config", "group": "panda_manipulator", "gripper_joint": "panda_finger_joint1",
-        "method": TOP_DOWN, "objects": objects, "target": objects[0]["name"], "max_checks": 6, "metrics": METRICS,
-    }  # fmt: skip
-    return runner.run(EpisodeSpec(0, {}, 0, 1, {**known, **settings}), folder)
+def generate(runner: GraspEpisodeRunner, folder: Path, objects: list[PlacedObject], **changes: Any) -> EpisodeRecord:
+    settings = GraspSettings(
+        robot="panda_hand_moveit_config", group="panda_manipulator", gripper_joint="panda_finger_joint1",
+        method=TOP_DOWN, objects=tuple(objects), target=objects[0].name, max_checks=6, metrics=METRICS,
+    )  # fmt: skip
+    return runner.run(EpisodeSpec(0, {}, 0, 1, replace(settings, **changes)), folder)
 
 
 def model(folder: Path, name: str, shape: str) -> Path:
@@ -124,7 +119,7 @@ def test_an_object_wider_than_the_hand_opens_cannot_be_grasped(runner: GraspEpis
 
 
 def test_a_seed_repeats_what_is_found(runner: GraspEpisodeRunner, tmp_path: Path, cube: Path) -> None:
-    metrics = ["candidates", "reachable_share", "best_rank"]
+    metrics = ("candidates", "reachable_share", "best_rank")
     scene = [at("cube", cube, 0.45, 0.1, 0.1)]
     one, again = (generate(runner, tmp_path, scene, method=ANTIPODAL, metrics=metrics) for _ in range(2))
     assert one.metrics == again.metrics
@@ -156,13 +151,13 @@ def read(text: str, folder: Path) -> Experiment:
 def test_the_methods_of_an_experiment_meet_the_same_scenes(tmp_path: Path) -> None:
     episodes = plan_episodes(read(GRASPS, tmp_path))
     assert len(episodes) == 6
-    by_trial = [[spec.settings for spec in episodes if spec.trial == trial] for trial in range(3)]
+    by_trial = [[spec.settings_of(GraspSettings) for spec in episodes if spec.trial == trial] for trial in range(3)]
     for first, second in by_trial:
-        assert first["objects"] == second["objects"] and first["method"] != second["method"]
-        assert first["target"] == "cube_1" and first["max_checks"] == 40
-        assert Path(first["objects"][0]["model"]).is_file()
-    assert len({settings[0]["objects"][0]["x"] for settings in by_trial}) == 3
-    assert np.isclose(by_trial[0][0]["objects"][0]["z"], 0.031)
+        assert first.objects == second.objects and first.method != second.method
+        assert first.target == "cube_1" and first.max_checks == 40
+        assert Path(first.objects[0].model).is_file()
+    assert len({settings[0].objects[0].x for settings in by_trial}) == 3
+    assert np.isclose(by_trial[0][0].objects[0].z, 0.031)
 
 
 def test_an_unknown_target_and_a_missing_robot_are_faults_of_the_file(tmp_path: Path) -> None:
@@ -172,7 +167,7 @@ def test_an_unknown_target_and_a_missing_robot_are_faults_of_the_file(tmp_path: 
         read(GRASPS.replace("robot: some_moveit_config\n", ""), tmp_path)
 
 
-@pytest.mark.parametrize("mode", RUNNERS)
+@pytest.mark.parametrize("mode", MODES)
 def test_every_mode_that_an_experiment_may_have_has_a_runner(mode: str) -> None:
     assert callable(runner_factory(mode))
     assert known_metrics()[mode]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,15 @@ import pytest
 import yaml
 
 from modular_framework_benchmark.commands import ros_make_problems
+from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.problem_sets import Problem
 from modular_framework_benchmark.modes import ros_planning_runner
 from modular_framework_benchmark.modes.measured_record import Stopwatch
 from modular_framework_benchmark.modes.ros_kinematics_runner import KinematicsEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_runner import PlanningEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import SettingsError
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
 ROBOT, GROUP = "panda_hand_moveit_config", "panda_arm"
@@ -37,17 +42,16 @@ def planning() -> Iterator[PlanningEpisodeRunner]:
     runner.close()
 
 
-def plan(runner: PlanningEpisodeRunner, problems: Path, folder: Path, seed: int = 1, **settings: Any) -> EpisodeRecord:
-    problem = {"name": "boxes/0001", "scene": problems / "scene0001.yaml", "request": problems / "request0001.yaml"}
-    known = {
-        "robot": ROBOT,
-        "planner": "RRTConnect",
-        "planning_time": 20.0,
-        "problem": {key: str(value) for key, value in problem.items()},
-        "metrics": ["success", "planning_time", "path_length", "motion_duration"],
-    }
+def plan(runner: PlanningEpisodeRunner, problems: Path, folder: Path, seed: int = 1, **changes: Any) -> EpisodeRecord:
+    settings = PlanningSettings(
+        robot=ROBOT,
+        planner="RRTConnect",
+        planning_time=20.0,
+        problem=Problem("boxes/0001", str(problems / "scene0001.yaml"), str(problems / "request0001.yaml")),
+        metrics=("success", "planning_time", "path_length", "motion_duration"),
+    )
     folder.mkdir()
-    return runner.run(EpisodeSpec(0, {}, 0, seed, {**known, **settings}), folder)
+    return runner.run(EpisodeSpec(0, {}, 0, seed, replace(settings, **changes)), folder)
 
 
 def test_a_planned_motion_joins_start_and_goal_and_is_measured(
@@ -148,8 +152,8 @@ def test_an_unknown_group_is_refused_with_the_known_ones(tmp_path: Path, capsys:
 
 
 def test_reachable_poses_are_solved(tmp_path: Path) -> None:
-    metrics = ["success", "solved_share", "solutions", "position_error", "rotation_error"]
-    settings = {"robot": ROBOT, "group": GROUP, "poses": 10, "metrics": metrics}
+    metrics = ("success", "solved_share", "solutions", "position_error", "rotation_error")
+    settings = KinematicsSettings(robot=ROBOT, group=GROUP, poses=10, timeout=5.0, metrics=metrics)
     record = KinematicsEpisodeRunner().run(EpisodeSpec(0, {}, 0, 3, settings), tmp_path)
     assert record.status is EpisodeStatus.SUCCEEDED, record.cause
     assert record.metrics["solved_share"] == 1.0 and record.metrics["solutions"] >= 1.0
@@ -157,6 +161,11 @@ def test_reachable_poses_are_solved(tmp_path: Path) -> None:
 
 
 def test_a_group_without_a_chain_is_refused(tmp_path: Path) -> None:
-    settings = {"robot": "dual_panda_moveit_config", "group": "both_arms", "poses": 1, "metrics": ["success"]}
+    settings = KinematicsSettings(robot="dual_panda_moveit_config", group="both_arms", poses=1, metrics=("success",))
     record = KinematicsEpisodeRunner().run(EpisodeSpec(0, {}, 0, 3, settings), tmp_path)
     assert record.status is EpisodeStatus.BROKEN and "both_arms' is not a chain" in record.cause
+
+
+def test_an_episode_of_another_mode_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="has PlanningSettings; allowed: KinematicsSettings"):
+        KinematicsEpisodeRunner().run(EpisodeSpec(0, {}, 0, 3, PlanningSettings(robot=ROBOT)), tmp_path)

@@ -43,7 +43,7 @@ def chosen() -> Callable[..., list[EpisodeSpec]]:
 
 
 def poses(episodes: list[EpisodeSpec]) -> list[tuple[float, ...]]:
-    return [tuple(placed[key] for key in ("x", "y", "yaw")) for one in episodes for placed in one.settings["objects"]]
+    return [(placed.x, placed.y, placed.yaw) for one in episodes for placed in one.settings.objects]
 
 
 @pytest.mark.parametrize("rounds", [1, 2])
@@ -51,7 +51,7 @@ def test_every_object_is_picked_equally_often_each_time_at_another_pose(
     chosen: Callable[..., list[EpisodeSpec]], rounds: int
 ) -> None:
     episodes = chosen(episodes=10 * rounds)
-    models = Counter(one.settings["objects"][0]["model"] for one in episodes)
+    models = Counter(one.settings.objects[0].model for one in episodes)
     assert len(models) == 10 and set(models.values()) == {rounds}
     assert len(set(poses(episodes))) == 10 * rounds
 
@@ -77,15 +77,15 @@ def test_robot_time_limit_and_launch_arguments_are_those_of_the_options(
 ) -> None:
     given = {"robot": "panda_hand_robot", "timeout": 60.0, "launch": ["world_file:=no.world", "urdf_args:=a:=1"]}
     (episode,) = chosen(episodes=1, **given)
-    assert episode.settings["launch"] == "panda_hand_robot/start_framework.launch"
-    assert episode.settings["time_limit"] == 60.0
-    assert episode.settings["arguments"]["world_file"] == "no.world"
-    assert episode.settings["arguments"]["urdf_args"] == "a:=1"
-    assert episode.settings["arguments"]["method_launch_file"] == "top_down_grasps/top_down_grasps.launch"
+    assert episode.settings.launch == "panda_hand_robot/start_framework.launch"
+    assert episode.settings.time_limit == 60.0
+    assert episode.settings.arguments["world_file"] == "no.world"
+    assert episode.settings.arguments["urdf_args"] == "a:=1"
+    assert episode.settings.arguments["method_launch_file"] == "top_down_grasps/top_down_grasps.launch"
 
 
 def test_another_task_is_checked_before_anything_starts(chosen: Callable[..., list[EpisodeSpec]]) -> None:
     (episode,) = chosen(episodes=1, launch=["task_constructor_script:=pick_and_hold.yaml"])
-    assert Path(episode.settings["task"]).name == "pick_and_hold.yaml"
+    assert Path(episode.settings.task).name == "pick_and_hold.yaml"
     with pytest.raises(ExperimentFault, match="there is no task 'none.yaml'"):
         chosen(episodes=1, launch=["task_constructor_script:=none.yaml"])

@@ -13,6 +13,7 @@ from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
 from modular_framework_benchmark.metrics.recording_files import reports_of
 from modular_framework_benchmark.metrics.registry import METRICS, measure
 from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.experiment import MetricKind
 from modular_framework_benchmark.reports.tables import metric_title
 from modular_framework_ros.reported_figures import CANDIDATES, FIGURES, Clock, Source, declared
@@ -25,7 +26,7 @@ def recorded(component: str, figures: Mapping[str, float]) -> EpisodeMeasurement
         "wall_begin": 0.0, "wall_s": 1.0, "figures": figures, "motion": None,
     }  # fmt: skip
     recording = json.loads(json.dumps({"reports": [entry]}))
-    return EpisodeMeasurements({}, EpisodeStatus.SUCCEEDED, reports=reports_of(recording))
+    return EpisodeMeasurements(EpisodeSettings(), EpisodeStatus.SUCCEEDED, reports=reports_of(recording))
 
 
 def test_a_declared_figure_of_a_recording_is_what_its_metric_measures() -> None:

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 from sample_experiment import METHODS, sample_description, sample_episodes, sample_record
 
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.problem_sets import Problem
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import Direction, Factor, Metric, MetricKind
 from modular_framework_benchmark.results.database import open_database
@@ -175,7 +178,7 @@ def test_a_sequential_experiment_that_becomes_a_fixed_one_has_been_looked_at(pat
 
 def test_episodes_of_planning_say_which_problem_they_had(path: Path) -> None:
     episodes = [
-        replace(spec, settings={**spec.settings, "problem": {"name": f"box/{spec.trial % 2}"}})
+        replace(spec, settings=PlanningSettings(problem=Problem(f"box/{spec.trial % 2}", "scene", "request")))
         for spec in sample_episodes(trials=4)
     ]
     with open_database(path, create=True) as database:
@@ -221,8 +224,8 @@ def test_a_changed_seed_or_setting_is_named(path: Path) -> None:
     episodes = sample_episodes()
     with open_database(path, create=True) as database:
         database.add_experiment(sample_description(), episodes)
-        other = [replace(spec, settings={**spec.settings, "speed": 0.9}) for spec in episodes]
-        with pytest.raises(ExperimentChangedError, match=r"'speed' of episode .* was 0.5 and is now 0.9"):
+        other = [replace(spec, settings=replace(spec.settings, time_limit=9.0)) for spec in episodes]
+        with pytest.raises(ExperimentChangedError, match=r"'time_limit' of episode .* was 300.0 and is now 9.0"):
             database.add_experiment(sample_description(digest="d2"), other)
         with pytest.raises(ExperimentChangedError, match=r"the seed of episode .* was 1000 and is now 7"):
             database.add_experiment(sample_description(digest="d2"), [replace(spec, seed=7) for spec in episodes])
@@ -289,7 +292,10 @@ def test_episodes_that_do_not_fit_their_experiment_are_refused(path: Path) -> No
                 [replace(episodes[0], configuration={"object": "cup"})],
                 "has levels for object; allowed: one for each of",
             ),
-            ([replace(episodes[0], settings={"object": object()})], "cannot be stored; use numbers, texts"),
+            (
+                [replace(episodes[0], settings=TaskSettings(parameters={"/object": object()}))],
+                "cannot be stored; use numbers, texts",
+            ),
         ):
             with pytest.raises(DescriptionError, match=message):
                 database.add_experiment(sample_description(), wrong)

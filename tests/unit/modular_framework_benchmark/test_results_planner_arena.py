@@ -6,6 +6,7 @@ The schema is that of the benchmark logs of OMPL; what is read here is what the 
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from pathlib import Path
 
@@ -104,7 +105,9 @@ def test_the_table_of_experiments_tells_time_limits_and_times_spent(arena: sqlit
 
 def test_the_settings_of_a_planner_are_those_all_its_episodes_share(arena: sqlite3.Connection) -> None:
     settings = dict(arena.execute("SELECT name, settings FROM plannerConfigs").fetchall())
-    assert settings["antipodal"] == '{"grasp_method":"antipodal","speed":0.5}'
+    shared = json.loads(settings["antipodal"])
+    assert shared["arguments"] == {"grasp_method": "antipodal"} and shared["parameters"] == {"/speed": 0.5}
+    assert "objects" not in shared
 
 
 def test_an_experiment_has_a_version_before_its_first_episode(tmp_path: Path) -> None:
@@ -117,7 +120,9 @@ def test_an_experiment_has_a_version_before_its_first_episode(tmp_path: Path) ->
 def test_factors_whose_names_are_taken_get_other_columns(tmp_path: Path) -> None:
     factors = (Factor("grasp_method", METHODS), Factor("version", ("1", "2")), Factor("date", ("new", "2")))
     specs = [
-        spec.__class__(spec.number, {"grasp_method": "antipodal", "version": "2", "date": "new"}, spec.trial, 1, {})
+        spec.__class__(
+            spec.number, {"grasp_method": "antipodal", "version": "2", "date": "new"}, spec.trial, 1, spec.settings
+        )
         for spec in sample_episodes(1)[:1]
     ]
     with open_database(tmp_path / "results.db", create=True) as database:

@@ -11,7 +11,10 @@ from scipy import stats
 from statistics_results import TIME, results_of
 from statsmodels.stats.multitest import multipletests
 
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.problem_sets import Problem
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.statistics.corrections import holm_tarone
 from modular_framework_benchmark.statistics.planned_power import power_text
 from modular_framework_benchmark.statistics.power import (
@@ -119,7 +122,11 @@ def planned(methods: int, trials: int, problems: int = 0) -> str:
     )
     episodes = [
         EpisodeSpec(
-            methods * trial + place, {"method": name}, trial, trial, {"problem": trial % problems} if problems else {}
+            methods * trial + place,
+            {"method": name},
+            trial,
+            trial,
+            PlanningSettings(problem=Problem(str(trial % problems), "", "")) if problems else EpisodeSettings(),
         )
         for trial in range(trials)
         for place, name in enumerate(names)

@@ -15,6 +15,7 @@ from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
@@ -41,7 +42,7 @@ def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
 
 
 def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
-    spec = EpisodeSpec(0, {}, 0, 1, {"metrics": ["success"]})
+    spec = EpisodeSpec(0, {}, 0, 1, TaskSettings(metrics=("success",)))
     end = EpisodeEnd(spec, tmp_path, time.time(), time.monotonic(), MachineLoad.now())
     return make_record(end.ended(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
 
@@ -90,7 +91,7 @@ def test_a_plan_without_simulation_by_another_planner_is_invalid(tmp_path: Path)
     run = PlannerRun("ompl", "RRTConnect", {}, (), "compiled", "BKPIECEE")
     ran = UsedSoftware().with_plans([run])
     report = ComponentReport("planning", "boxes", True, "", 0.0, 1.0, wall_s=1.0, ran=ran)
-    spec = EpisodeSpec(0, {}, 0, 1, {"metrics": ["success", "planning_time"]})
+    spec = EpisodeSpec(0, {}, 0, 1, TaskSettings(metrics=("success", "planning_time")))
     record = measured_record(spec, EpisodeStatus.SUCCEEDED, "SUCCESS", report, tmp_path, Stopwatch())
     assert (record.status, record.cause) == (EpisodeStatus.INVALID, REPLACED)
     assert record.metrics == {"success": None, "planning_time": None}

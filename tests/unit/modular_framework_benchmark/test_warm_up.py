@@ -12,6 +12,7 @@ import pytest
 from modular_framework_benchmark.episodes import ros_task_runner
 from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
 from modular_framework_benchmark.episodes.stack import StackLaunch
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 
 START_S = 8.0
@@ -69,7 +70,7 @@ def run_episodes(
     runner, records = TaskEpisodeRunner(), []
     for number in range(count):
         (folder / str(number)).mkdir()
-        spec = EpisodeSpec(number, {}, number, number, {"time_limit": 30.0})
+        spec = EpisodeSpec(number, {}, number, number, TaskSettings(time_limit=30.0))
         records.append(runner.run(spec, folder / str(number)))
     runner.close()
     return records, stacks

@@ -1,32 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runners and metrics of each mode."""
+"""Runners, checks and metrics of each mode."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
+from modular_framework_benchmark.experiments.mode import SettingsCheck
+from modular_framework_benchmark.experiments.modes import MODES
+from modular_framework_benchmark.experiments.task_mode import TASK
 from modular_framework_benchmark.records.experiment import Metric
 from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory
 from modular_framework_ros.reported_figures import Source
-
-_PACKAGE = "modular_framework_benchmark"
-RUNNERS = {
-    "task": f"{_PACKAGE}.episodes.ros_task_runner:TaskEpisodeRunner",
-    "planning": f"{_PACKAGE}.modes.ros_planning_runner:PlanningEpisodeRunner",
-    "kinematics": f"{_PACKAGE}.modes.ros_kinematics_runner:KinematicsEpisodeRunner",
-    "grasps": f"{_PACKAGE}.modes.ros_grasp_runner:GraspEpisodeRunner",
-}
-"""MODULE:NAME of each mode's runner factory."""
-COMPONENTS = {
-    "task": {"task", "generation", "planning", "execution", "grasp"},
-    "planning": {"planning"},
-    "kinematics": {"kinematics"},
-    "grasps": {"generation"},
-}
-"""Components whose metrics a mode measures, in addition to success."""
 
 
 class RunnerError(Exception):
@@ -38,13 +26,18 @@ def known_metrics() -> dict[str, Mapping[str, Metric]]:
     from modular_framework_benchmark.metrics.registry import METRICS  # not needed by `resume`
 
     return {
-        mode: {
-            name: known.metric if mode == "task" else dataclasses.replace(known.metric, source=Source.MEASURED)
+        mode.name: {
+            name: known.metric if mode is TASK else dataclasses.replace(known.metric, source=Source.MEASURED)
             for name, known in METRICS.items()
-            if name == "success" or known.metric.component in components
+            if name == "success" or known.metric.component in mode.components
         }
-        for mode, components in COMPONENTS.items()
+        for mode in MODES.values()
     }
+
+
+def setting_checks() -> dict[str, SettingsCheck]:
+    """Returns the checks of the settings, keyed by mode."""
+    return {mode.name: partial(_loaded(mode.check), _loaded(mode.runner)()) for mode in MODES.values()}
 
 
 def runner_factory(mode: str, own: str = "") -> RunnerFactory:
@@ -57,10 +50,9 @@ def runner_factory(mode: str, own: str = "") -> RunnerFactory:
     Raises:
         RunnerError: The factory cannot be imported.
     """
-    reference = own or RUNNERS[mode]
-    module, _, name = reference.partition(":")
+    reference = own or MODES[mode].runner
     try:
-        factory: Any = getattr(importlib.import_module(module), name)
+        factory = _loaded(reference)
     except (ImportError, AttributeError, ValueError) as error:
         raise RunnerError(
             f"the runner {reference} of mode {mode} cannot be imported ({error}); build and source the workspace, or "
@@ -69,3 +61,9 @@ def runner_factory(mode: str, own: str = "") -> RunnerFactory:
     if not callable(factory):
         raise RunnerError(f"the runner {reference} is not a class or function; correct --runner")
     return factory  # type: ignore[no-any-return]
+
+
+def _loaded(reference: str) -> Any:
+    """Returns the object that MODULE:NAME names."""
+    module, _, name = reference.partition(":")
+    return getattr(importlib.import_module(module), name)

@@ -12,9 +12,8 @@ from pathlib import Path
 import rospkg
 
 from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
-from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics
+from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics, setting_checks
 from modular_framework_benchmark.commands.stopping_rules import settings_of
-from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
@@ -23,6 +22,7 @@ from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.modes.ros_disk_estimate import disk_text
 from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import SettingsError
 from modular_framework_benchmark.results.connection import shown_target
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError, ResultsError
@@ -93,7 +93,6 @@ def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Nam
 def _run(options: argparse.Namespace) -> int:
     # Imported here, because `resume` does not need roslaunch.
     from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
-    from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 
     experiment = load_experiment(experiment_path(options.file), RosResourceLookup(), known_metrics(), setting_checks())
     episodes = plan_episodes(experiment)
@@ -101,7 +100,7 @@ def _run(options: argparse.Namespace) -> int:
         from modular_framework_benchmark.statistics.planned_power import power_text  # slow to import
 
         print(design_text(experiment, episodes))
-        print(disk_text(experiment.description.mode, episodes))
+        print(disk_text(episodes))
         print(power_text(experiment.description, episodes))
         return 0
     target = options.database or f"{experiment.description.name}.db"
@@ -122,7 +121,7 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
         WorkerStartError: A worker cannot be started.
     """
     with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
-        ran_with = run_digests(experiment.description.mode, episodes)
+        ran_with = run_digests(episodes)
         number = database.add_experiment(experiment.described(digest_of(experiment, episodes), ran_with), episodes)
         return _session(database, number, lock, options, experiment).run()
 
@@ -130,8 +129,7 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
 def _resume(options: argparse.Namespace) -> int:
     with RunLock(options.database) as lock, open_database(options.database) as database:
         number = _unfinished(database, options.experiment, options.database)
-        (mode,) = (each.description.mode for each in database.experiments() if each.id == number)
-        database.check_resumed(number, run_digests(mode, database.pending(number)))
+        database.check_resumed(number, run_digests(database.pending(number)))
         return _session(database, number, lock, _session_options(options, options.database), None).run()
 
 

@@ -23,6 +23,7 @@ from modular_framework_benchmark.metrics.recording_files import (
 )
 from modular_framework_benchmark.metrics.registry import measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.results import COLD_START
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
@@ -124,7 +125,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         shake=Shake(**answer["shake"]) if answer.get("shake") else None,
         folder=end.folder,
     )
-    measured = measure(end.spec.settings.get("metrics") or (), measurements)
+    measured = measure(end.spec.settings.metrics, measurements)
     invalid = end.status is EpisodeStatus.INVALID
     spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording))
     return EpisodeRecord(
@@ -155,7 +156,7 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
         "reference_s": reference_s(),
         **MachineLoad.now().since(end.load),
         "seed": end.spec.seed,
-        "settings": dict(end.spec.settings),
+        "settings": as_json(end.spec.settings),
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
         **{key: end.answer[key] for key in SNAPSHOT_KEYS if end.answer.get(key)},

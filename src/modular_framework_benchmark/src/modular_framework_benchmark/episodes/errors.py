@@ -2,10 +2,6 @@
 """Errors of episodes of mode `task`."""
 
 
-class SettingsError(ValueError):
-    """A setting of an episode has a wrong type or value; the message names the setting."""
-
-
 class EpisodeAbortedError(RuntimeError):
     """The episode was aborted from outside."""
 

@@ -33,6 +33,7 @@ from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, InterferenceError, WorldError, judge, spawn
+from modular_framework_benchmark.records.episode_settings import PlacedObject, from_json
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
     EpisodeError,
@@ -63,7 +64,7 @@ class EpisodeRequest:
 
     Attributes:
         folder: Folder of the recording.
-        objects: Objects to spawn: `name`, `model`, `position`, `rpy`.
+        objects: Objects to spawn.
         target: Name of the object in the success criteria; "" for none.
         hold_s: Simulated time between the end of the task and the check [s].
         shake_s: Simulated duration of the shake after the check [s].
@@ -75,13 +76,13 @@ class EpisodeRequest:
     """
 
     folder: str
-    objects: list[dict[str, Any]]
+    objects: tuple[PlacedObject, ...]
     target: str
     hold_s: float
     shake_s: float
     bag: bool
-    method_nodes: list[str]
-    controllers: list[str]
+    method_nodes: tuple[str, ...]
+    controllers: tuple[str, ...]
     parameters: dict[str, Any]
     begun: float
 
@@ -129,7 +130,7 @@ class EpisodeRecorder:
                 answer["foul"] = str(error)
                 if not self._samples.ends:
                     self._stop_task()
-            spawned = {entry["name"]: entry["model"] for entry in request.objects}
+            spawned = {placed.name: placed.model for placed in request.objects}
             answer |= write_recording(folder, self._samples, spawned, answer, rate_hz)
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
@@ -165,8 +166,8 @@ class EpisodeRecorder:
         def spawn_all() -> None:
             self._samples.clear()
             answer["zero"] = self._now()
-            for entry in request.objects:
-                spawn(entry)
+            for placed in request.objects:
+                spawn(placed)
             answer["interventions"] = judge().number
 
         answer["processor_before_s"] = processor_time_s(request.method_nodes)
@@ -315,7 +316,7 @@ def main() -> int:
             if not connected:
                 recorder.connect()
                 connected = True
-            answer = recorder.run(EpisodeRequest(**request))
+            answer = recorder.run(from_json(EpisodeRequest, request))
         except EpisodeAbortedError:
             answer = {"aborted": True}
         except (WorldError, EpisodeError, BagError, CallError, rospy.ROSException) as error:

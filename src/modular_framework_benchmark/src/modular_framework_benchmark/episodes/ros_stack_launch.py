@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import roslaunch.config
 import roslaunch.core
@@ -16,10 +13,9 @@ import roslaunch.rlutil
 import roslaunch.xmlloader
 import rospkg
 
-from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.stack import StackLaunch
-from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
-from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.records.episode_settings import SettingsError
 from modular_framework_core.launching.launch_arguments import (
     argument_values,
     check_arguments,
@@ -45,11 +41,15 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
     Raises:
         SettingsError: The launch file does not exist, or an argument is wrong.
     """
+    file = settings.launch
+    package, _, name = ("", "", file) if file.startswith("/") else file.partition("/")
+    if not name:
+        raise SettingsError(f"setting 'launch' is {file!r}; allowed: PACKAGE/FILE.launch; correct it")
     try:
-        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (settings.package, settings.launch_file))])[0]
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, name))])[0]
         known = known_arguments(path)
         arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
-        arguments |= settings.arguments
+        arguments |= {**settings.arguments, **({"task_constructor_script": settings.task} if settings.task else {})}
         arguments |= {name: value for name, value in FIXED_ARGUMENTS.items() if name in known}
         given = [f"{name}:={value}" for name, value in arguments.items()]
         check_arguments(path, given, file_faults)
@@ -60,10 +60,10 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
             folder = Path(rospkg.RosPack().get_path(values["robot_package"])) / "controllers"
             controllers = read_controller_file(folder / values["controller_file"]).controllers
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ControllerFileError, OSError) as error:
-        raise SettingsError(f"setting 'launch' {settings.package}/{settings.launch_file}: {error}") from error
+        raise SettingsError(f"setting 'launch' {package}/{name}: {error}") from error
     return StackLaunch(
-        settings.package,
-        settings.launch_file,
+        package,
+        name,
         arguments,
         {"/task/wait_for_start": True, LAUNCH_SEED: 0, **settings.parameters},
         method_nodes,
@@ -80,29 +80,25 @@ class StackPreview:
     preview: LaunchPreview
 
 
-LAUNCH_SETTINGS = ("launch", "arguments", "task")
-"""Settings that determine the launch; an episode's parameters override those of its launch files."""
-
-
-def preview_stack(settings: Mapping[str, Any]) -> StackPreview:
-    """Returns the preview of an episode's stack; equal launches are loaded once.
+def preview_stack(settings: TaskSettings) -> StackPreview:
+    """Returns the preview of an episode's stack, without its parameters; equal launches are loaded once.
 
     Raises:
         SettingsError: See `resolve_launch`; or the launch file is invalid.
     """
-    return loaded_stack(json.dumps({key: settings[key] for key in LAUNCH_SETTINGS if key in settings}, sort_keys=True))
+    return loaded_stack(settings.launch, settings.task, tuple(sorted(settings.arguments.items())))
 
 
 @lru_cache(maxsize=256)
-def loaded_stack(settings: str) -> StackPreview:
-    """Returns the preview of a stack from settings as JSON; cached per process."""
-    launch = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, json.loads(settings))))
+def loaded_stack(launch: str, task: str, arguments: tuple[tuple[str, str], ...]) -> StackPreview:
+    """Returns the preview of a stack, see `TaskSettings`; cached per process."""
+    resolved = resolve_launch(TaskSettings(launch=launch, task=task, arguments=dict(arguments)))
     try:
-        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (launch.package, launch.launch_file))])[0]
-        preview = preview_launch(path, [f"{name}:={value}" for name, value in launch.arguments.items()])
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (resolved.package, resolved.launch_file))])[0]
+        preview = preview_launch(path, [f"{name}:={value}" for name, value in resolved.arguments.items()])
     except roslaunch.core.RLException as error:
-        raise SettingsError(f"setting 'launch' {launch.package}/{launch.launch_file}: {error}") from error
-    return StackPreview(launch, preview)
+        raise SettingsError(f"setting 'launch' {resolved.package}/{resolved.launch_file}: {error}") from error
+    return StackPreview(resolved, preview)
 
 
 def _nodes_of(method: str) -> tuple[str, ...]:

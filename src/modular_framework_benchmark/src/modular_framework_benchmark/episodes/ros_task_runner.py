@@ -13,12 +13,12 @@ from typing import Any
 
 from modular_framework_benchmark.episodes.episode_record import TASK_RECORDS, EpisodeEnd, make_record
 from modular_framework_benchmark.episodes.episode_video import make_video_apart
-from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.episodes.stack import Stack, StackError, StackLaunch
-from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
+from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import SettingsError
 
 ABORT_TIMEOUT_S = 15.0
 """Time for the recorder to write its data when an episode is aborted [s]."""
@@ -51,13 +51,13 @@ class TaskEpisodeRunner:
         """
         end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), MachineLoad.now())
         try:
-            settings = read_settings(spec)
-            launch = self._launch_of(settings)
+            settings = spec.settings_of(TaskSettings)
+            launch, target = self._launch_of(settings), settings.judged_object
         except SettingsError as error:
             self.close()
             return make_record(end.broken(str(error)))
         stack, is_cold = self._stack_for(launch)
-        end = end.first_of_stack(is_cold)
+        end = end.first_of_stack(is_cold).with_target(target)
         try:
             end = self._run_on(stack, settings, launch, end)
             if is_cold and _can_run_again(stack, settings, launch, end):
@@ -69,7 +69,7 @@ class TaskEpisodeRunner:
             if not (settings.warm and _can_restart(stack, launch, end)):
                 self.close()
         end = end.stopped(time.monotonic() - stop)
-        if settings.record_video and "zero" in end.answer:
+        if settings.record.video and "zero" in end.answer:
             end = end.with_video_fault(make_video_apart(folder))
         return make_record(end)
 
@@ -81,8 +81,7 @@ class TaskEpisodeRunner:
 
     def _launch_of(self, settings: TaskSettings) -> StackLaunch:
         """Returns the launch of an episode; cached, because resolving it takes as long as a warm start."""
-        parts = (settings.package, settings.launch_file, dict(settings.arguments), dict(settings.parameters))
-        key = json.dumps(parts, sort_keys=True)
+        key = json.dumps([settings.launch, settings.arguments, settings.task, settings.parameters], sort_keys=True)
         if key not in self._resolved:
             self._resolved[key] = resolve_launch(settings)
         return self._resolved[key]
@@ -99,24 +98,23 @@ class TaskEpisodeRunner:
         request = {
             "folder": str(end.folder),
             "objects": [asdict(placed) for placed in settings.objects],
-            "target": settings.success.object,
+            "target": end.target,
             "hold_s": settings.success.hold_s,
-            "shake_s": settings.shake_s,
-            "bag": settings.record_bag,
+            "shake_s": settings.success.shake or 0.0,
+            "bag": settings.record.bag,
             "method_nodes": list(launch.method_nodes),
             "controllers": list(launch.controllers),
             "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / TASK_RECORDS)},
             "begun": end.begun_monotonic,
         }
-        end = end.with_target(settings.success.object)
-        remaining_s = settings.time_limit_s - (time.monotonic() - end.begun_monotonic)
+        remaining_s = settings.time_limit - (time.monotonic() - end.begun_monotonic)
         try:
             answer = stack.request(request, remaining_s)
         except StackError as error:
             return end.broken(str(error))
         except TimeoutError:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
-            cause = f"no end within {settings.time_limit_s:g} s; {stack.last_output()}"
+            cause = f"no end within {settings.time_limit:g} s; {stack.last_output()}"
             # The method is not called before the world is ready.
             status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
             return end.ended(status, cause, answer)
@@ -124,7 +122,7 @@ class TaskEpisodeRunner:
             return end.broken(stack.root_cause(str(answer["fault"])))
         if answer.get("foul"):
             return end.ended(EpisodeStatus.INVALID, str(answer["foul"]), answer)
-        cause = _failure(settings, answer)
+        cause = _failure(settings.success, end.target, answer)
         return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
 
 
@@ -140,7 +138,7 @@ def _can_run_again(stack: Stack, settings: TaskSettings, launch: StackLaunch, en
         return False
     spent_s = time.monotonic() - end.begun_monotonic
     run_s = spent_s - float(end.answer["parts"]["up"])
-    return spent_s + run_s < settings.time_limit_s
+    return spent_s + run_s < settings.time_limit
 
 
 def _empty(folder: Path) -> None:
@@ -151,19 +149,24 @@ def _empty(folder: Path) -> None:
             path.unlink()
 
 
-def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:
-    """Returns why an episode whose task ended did not succeed; "" after a success."""
+def _failure(wanted: SuccessCriteria, target: str, answer: Mapping[str, Any]) -> str:
+    """Returns why an episode whose task ended did not succeed; "" after a success.
+
+    Args:
+        wanted: Success criteria.
+        target: Name of the object to be lifted and held; "" if the outcome of the task suffices.
+        answer: Answer of the recorder.
+    """
     if not answer["task_succeeded"]:
         return str(answer["reason"]) or f"the task ended with outcome '{answer['outcome']}'"
-    wanted = settings.success
-    if not wanted.object:
+    if not target:
         return ""
-    lifted, held = answer["lifted"].get(wanted.object), bool(answer["held"])
+    lifted, held = answer["lifted"].get(target), bool(answer["held"])
     if lifted is None:
-        return f"there is no object '{wanted.object}' in the world; 'success' must name an object of the episode"
+        return f"there is no object '{target}' in the world; 'success' must name an object of the episode"
     if lifted > wanted.lifted_m and held:
         return ""
     return (
-        f"the task claims success, but '{wanted.object}' is {lifted:.3f} m higher {wanted.hold_s:g} s later "
+        f"the task claims success, but '{target}' is {lifted:.3f} m higher {wanted.hold_s:g} s later "
         f"(wanted: more than {wanted.lifted_m:g} m) and {'still' if held else 'not'} in the gripper"
     )

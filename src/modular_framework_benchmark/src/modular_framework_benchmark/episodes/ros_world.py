@@ -15,6 +15,7 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Trigger, TriggerRequest
 
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_ros.calls import call_service, request_service, wait_for_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
@@ -27,11 +28,11 @@ class WorldError(RuntimeError):
     """An object cannot be spawned; the message gives the reason."""
 
 
-def spawn(entry: dict[str, Any]) -> None:
+def spawn(placed: PlacedObject) -> None:
     """Spawns an object in the world.
 
     Args:
-        entry: `name`, `model`, `position` [m] and `rpy` [rad] in the world frame, see `PlacedObject`.
+        placed: Object with its pose.
 
     Raises:
         WorldError: The model does not exist, or the simulation rejects it.
@@ -39,12 +40,12 @@ def spawn(entry: dict[str, Any]) -> None:
     """
     proxy = rospy.ServiceProxy(SPAWN_SERVICE, SpawnModel)
     wait_for_service(proxy, SERVICE_TIMEOUT_S)
-    x, y, z, w = quaternion_from_rpy(*entry["rpy"])
-    pose = Pose(Point(*entry["position"]), Quaternion(x, y, z, w))
-    request = SpawnModel._request_class(entry["name"], _description(entry["model"]), "", pose, "world")
+    x, y, z, w = quaternion_from_rpy(*placed.rpy)
+    pose = Pose(Point(*placed.xyz), Quaternion(x, y, z, w))
+    request = SpawnModel._request_class(placed.name, _description(placed.model), "", pose, "world")
     response = call_service(proxy, request, SERVICE_TIMEOUT_S)
     if not response.success:
-        raise WorldError(f"object '{entry['name']}' cannot be spawned: {response.status_message}")
+        raise WorldError(f"object '{placed.name}' cannot be spawned: {response.status_message}")
 
 
 @dataclass(frozen=True, slots=True)

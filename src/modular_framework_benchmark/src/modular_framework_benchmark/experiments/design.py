@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ from modular_framework_benchmark.experiments.distributions import generator_of
 from modular_framework_benchmark.experiments.experiment import Combination, Experiment
 from modular_framework_benchmark.experiments.reading import MAX_SEED
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json
 
-TRIAL_SETTINGS = ("objects", "problems", "problem")
-"""Settings that differ between the trials of a combination; the other settings determine the running stack."""
+DRAWN_SETTINGS = ("objects", "problem")
+"""Settings that each trial of a combination draws; the other settings determine the running stack."""
 
 
 def plan_episodes(experiment: Experiment) -> list[EpisodeSpec]:
@@ -46,9 +48,9 @@ def _groups(experiment: Experiment) -> list[list[Combination]]:
     return list(groups.values())
 
 
-def stack_of(settings: Mapping[str, Any]) -> str:
+def stack_of(settings: EpisodeSettings) -> str:
     """Returns the settings that determine an episode's stack as text; episodes with equal texts can share a stack."""
-    return _canonical({key: value for key, value in settings.items() if key not in TRIAL_SETTINGS})
+    return _canonical({name: value for name, value in as_json(settings).items() if name not in DRAWN_SETTINGS})
 
 
 def _episode(experiment: Experiment, combination: Combination, trial: int, number: int) -> EpisodeSpec:
@@ -58,7 +60,7 @@ def _episode(experiment: Experiment, combination: Combination, trial: int, numbe
         configuration=dict(combination.configuration),
         trial=trial,
         seed=generator_of(experiment.seed, "episode", pair_key, trial).randint(1, MAX_SEED),
-        settings=_drawn(experiment, combination.settings, pair_key, trial),
+        settings=_drawn(experiment, combination, pair_key, trial),
     )
 
 
@@ -67,20 +69,20 @@ def pair_of(configuration: Mapping[str, str], compared: str) -> str:
     return ",".join(f"{name}={configuration[name]}" for name in sorted(configuration) if name != compared)
 
 
-def _drawn(experiment: Experiment, settings: Mapping[str, Any], pair_key: str, trial: int) -> dict[str, Any]:
-    """Returns the settings of one episode as plain JSON values."""
-    drawn = {key: value for key, value in settings.items() if key not in TRIAL_SETTINGS}
-    if "objects" in settings:
-        drawn["objects"] = [
-            item.sampled((experiment.seed, pair_key, trial), index) for index, item in enumerate(settings["objects"])
-        ]
-    if "problems" in settings:
-        drawn["problem"] = settings["problems"][trial % len(settings["problems"])]
-    return drawn | {
-        "metrics": list(experiment.metric_specs),
-        "record": dict(experiment.record),
-        "time_limit": experiment.description.time_limit_s,
-    }
+def _drawn(experiment: Experiment, combination: Combination, pair_key: str, trial: int) -> EpisodeSettings:
+    """Returns the settings of one episode, with its scene or problem."""
+    key, drawn = (experiment.seed, pair_key, trial), dict[str, Any]()
+    if combination.objects:
+        drawn["objects"] = tuple(item.sampled(key, index) for index, item in enumerate(combination.objects))
+    if combination.problems:
+        drawn["problem"] = combination.problems[trial % len(combination.problems)]
+    return replace(
+        combination.settings,
+        metrics=experiment.metric_specs,
+        record=experiment.record,
+        time_limit=experiment.description.time_limit_s,
+        **drawn,
+    )
 
 
 def digest_of(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
@@ -104,7 +106,9 @@ def digest_of(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
 def _digest_parts(head: Mapping[str, Any], episodes: Sequence[EpisodeSpec]) -> Iterator[str]:
     yield _canonical(head)
     for spec in episodes:
-        yield _canonical([spec.number, dict(spec.configuration), spec.trial, spec.seed, _portable(spec.settings)])
+        yield _canonical(
+            [spec.number, dict(spec.configuration), spec.trial, spec.seed, _portable(as_json(spec.settings))]
+        )
 
 
 def _portable(value: Any) -> Any:

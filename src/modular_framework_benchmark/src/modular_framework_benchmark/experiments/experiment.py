@@ -6,8 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
+from pathlib import Path
 
+from modular_framework_benchmark.experiments.problem_sets import Problem
+from modular_framework_benchmark.experiments.scene_objects import SceneObject
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, MetricSpec, RecordedFiles
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 
 
@@ -40,11 +43,21 @@ class Combination:
 
     Attributes:
         configuration: Level of each factor, keyed by factor name.
-        settings: Values of the mode's keys; numbers of a scene are `Distribution`s.
+        settings: Settings without scene and problem, which each trial draws.
+        objects: Objects that each trial places.
+        problems: Planning problems, of which each trial has one.
     """
 
     configuration: Mapping[str, str]
-    settings: Mapping[str, Any]
+    settings: EpisodeSettings
+    objects: tuple[SceneObject, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def files(self) -> list[Path]:
+        """Returns the files whose content determines the episodes."""
+        problems = [Path(file) for problem in self.problems for file in (problem.scene, problem.request)]
+        return [*(item.file for item in self.objects), *self.settings.files, *problems]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +70,10 @@ class Experiment:
         trials: Number of trials; an upper limit for a sequential rule.
         seed: Seed of the scenes and of the episodes' seeds.
         block: Minimum number of trials between two changes of the method.
-        metric_specs: Metrics as the episodes need them: a name, or {function: absolute FILE.py:NAME, ...} of a user.
+        metric_specs: Metrics as the episodes need them: names of metrics of the framework, and the user's metrics.
         stopping: Stopping rule.
         workers: Number of episodes that run in parallel.
-        record: Whether an episode keeps each kind of file: `log`, `trajectories`, `bag`, `video`.
+        record: Files that an episode keeps.
         files: SHA-256 digests of the other files that determine the episodes, keyed by portable file name.
         substitutions: Substitutions of named planners and solvers, known in advance.
     """
@@ -70,10 +83,10 @@ class Experiment:
     trials: int
     seed: int
     block: int
-    metric_specs: tuple[Any, ...]
+    metric_specs: tuple[MetricSpec, ...]
     stopping: Stopping
     workers: int
-    record: Mapping[str, bool]
+    record: RecordedFiles
     files: Mapping[str, str]
     substitutions: tuple[str, ...] = ()
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping as Map
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +19,13 @@ from modular_framework_benchmark.experiments.factor_reading import (
     read_design,
     read_factors,
 )
-from modular_framework_benchmark.experiments.metric_choices import MetricSpec, metric_files, read_metrics
-from modular_framework_benchmark.experiments.mode_settings import (
-    MODES,
-    model_files,
-    read_settings,
-)
+from modular_framework_benchmark.experiments.metric_choices import metric_files, read_metrics
+from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingsCheck
+from modular_framework_benchmark.experiments.modes import MODES
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
-from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingsCheck
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
+from modular_framework_benchmark.records.episode_settings import MetricSpec, RecordedFiles, as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
@@ -41,7 +39,6 @@ OPTIONAL = (
     "record",
 )  # fmt: skip
 KEYS = (*REQUIRED, *OPTIONAL)
-FILES = {"log": True, "trajectories": True, "bag": False, "video": False}
 MAX_EPISODES = 10_000_000
 
 SettingChecks = Map[str, SettingsCheck]
@@ -181,9 +178,7 @@ class _Reader:
             stopping=stopping,
             workers=int(numbers["workers"] or 1),
             record=record,
-            files=_digests(
-                metric_files(metric_specs) + [file for one in combinations for file in model_files(one.settings)]
-            ),
+            files=_digests(metric_files(metric_specs) + [file for one in combinations for file in one.files]),
             substitutions=tuple(self._substitutions),
         )
 
@@ -251,7 +246,7 @@ class _Reader:
 
     def _note_repeated_problems(self, stopping: Stopping, items: tuple[Combination, ...], trials: int) -> None:
         """Adds a fault for repeated problems under a sequential rule, which would change units already analysed."""
-        counts = {len(item.settings.get("problems", ())) for item in items}
+        counts = {len(item.problems) for item in items}
         min_problems = min((count for count in counts if count > 1), default=trials)
         if stopping.kind is StoppingKind.SEQUENTIAL and min_problems < trials:
             self._reading.faults.add(
@@ -263,7 +258,7 @@ class _Reader:
     def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[MetricSpec, ...]]:
         if self._mode is None:  # the available metrics depend on the mode
             return (), ()
-        budgets = {one.settings.get("planning_time", one.settings.get("timeout")) for one in combinations}
+        budgets = {one.settings.budget_s for one in combinations}
         budget_s = budgets.pop() if len(budgets) == 1 else None
         return read_metrics(self._root.entries.get("metrics"), self._known.get(self._mode, {}), budget_s, self._reading)
 
@@ -276,16 +271,14 @@ class _Reader:
                     f"'{metric.name}' is both a metric and a factor; rename one of them",
                 )
 
-    def _record(self) -> dict[str, bool]:
+    def _record(self) -> RecordedFiles:
         node = self._root.entries.get("record")
         mapping = self._reading.mapping(node, "record", "{video: true}") if node is not None else None
-        record = dict(FILES)
         if mapping is None:
-            return record
-        known = corrected_keys(mapping, tuple(FILES), "the key of record", self._reading.faults)
-        for key, value in known.entries.items():
-            record[key] = bool(self._reading.truth(value, key))
-        return record
+            return RecordedFiles()
+        kinds = tuple(item.name for item in fields(RecordedFiles))
+        known = corrected_keys(mapping, kinds, "the key of record", self._reading.faults)
+        return RecordedFiles(**{key: bool(self._reading.truth(value, key)) for key, value in known.entries.items()})
 
     def _combinations(self, factors: Levels, design: list[dict[str, str]]) -> tuple[Combination, ...]:
         if self._mode is None or not self._refers_to_factors or not all(factors.values()):
@@ -293,21 +286,23 @@ class _Reader:
         found, resolved = [], {}
         for item in design:
             node = combined(self._base, factors, item, self._meant_factors)
-            settings = read_settings(str(self._mode), node, self._reading)
-            resolved[tuple(item.items())] = self._resolved(node, settings)
-            found.append(Combination(item, settings))
+            read = MODES[self._mode].read(node, self._reading)
+            resolved[tuple(item.items())] = self._resolved(read)
+            found.append(Combination(item, read.settings, read.objects, read.problems))
         if not len(self._reading.faults):
             note_equal_levels(factors, resolved, self._reading)
         return tuple(found)
 
-    def _resolved(self, node: Mapping, settings: Map[str, Any]) -> str:
+    def _resolved(self, read: ReadSettings[Any]) -> str:
         """Resolves the names in a combination's settings; returns a text that is equal for equal executions."""
         check = self._checks.get(str(self._mode))
-        checked = CheckedSettings((), settings) if check is None else check(settings)
+        checked = CheckedSettings((), as_json(read.settings)) if check is None else check(read)
         for fault in checked.faults:
-            self._reading.faults.add(location_below(node, fault.keys), fault.text)
+            self._reading.faults.add(location_below(read.node, fault.keys), fault.text)
         self._substitutions.update(dict.fromkeys(checked.substitutions))
-        return json.dumps(checked.resolved, sort_keys=True, default=repr) if checked.resolved is not None else ""
+        if checked.resolved is None:
+            return ""
+        return json.dumps([checked.resolved, read.objects, read.problems], sort_keys=True, default=repr)
 
 
 def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueReading) -> Stopping:

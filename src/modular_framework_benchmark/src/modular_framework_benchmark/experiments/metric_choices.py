@@ -7,9 +7,9 @@ import ast
 import dataclasses
 from collections.abc import Mapping as Map
 from pathlib import Path
-from typing import Any
 
 from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.records.episode_settings import MetricSpec, OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
@@ -19,8 +19,6 @@ from modular_framework_ros.reported_figures import Clock
 OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")
 KNOWN_KEYS = ("metric", "limit")
 EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
-
-MetricSpec = Any  # name of a known metric, or the mapping of a user's function
 
 
 def read_metrics(
@@ -120,7 +118,7 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | 
         name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit,
         text("description", ""), lowest, highest,
     )  # fmt: skip
-    return metric, {"name": name, "function": f"{path}:{function}"}
+    return metric, OwnMetric(name, f"{path}:{function}")
 
 
 def _choice(node: Mapping, key: str, allowed: list[str], default: str, reading: Reading) -> str:
@@ -163,5 +161,4 @@ def _located_function(target: str, node: Node, reading: Reading) -> tuple[Path, 
 
 def metric_files(metric_specs: tuple[MetricSpec, ...]) -> list[Path]:
     """Returns the files of the user's functions."""
-    functions = [metric_spec["function"] for metric_spec in metric_specs if not isinstance(metric_spec, str)]
-    return [Path(function.rpartition(":")[0]) for function in functions]
+    return [Path(spec.function.rpartition(":")[0]) for spec in metric_specs if not isinstance(spec, str)]

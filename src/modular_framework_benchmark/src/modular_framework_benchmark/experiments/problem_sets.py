@@ -3,25 +3,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_core.files.located_yaml import Node, Sequence
 
 
-def read_problems(node: Node, reading: Reading) -> list[dict[str, str]] | None:
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A motion planning problem.
+
+    Attributes:
+        name: FAMILY/NUMBER.
+        scene: Absolute path of the file of the scene.
+        request: Absolute path of the file of the request.
+    """
+
+    name: str
+    scene: str
+    request: str
+
+
+NO_PROBLEM = Problem("", "", "")
+"""Problem of a combination, whose trials draw their problems."""
+
+
+def read_problems(node: Node, key: str, reading: Reading) -> list[Problem]:
     """Returns the problems of one or several folders, sorted by name within a folder.
 
     Args:
         node: Path of a folder, or a list of paths.
+        key: Key of the value.
         reading: Reader that collects faults.
-
-    Returns:
-        {name, scene, request} per problem: FAMILY/NUMBER, and absolute paths.
     """
-    problems: list[dict[str, str]] = []
+    problems: list[Problem] = []
     for item in node.items if isinstance(node, Sequence) else (node,):
-        text = reading.text(item, "problems")
+        text = reading.text(item, key)
         if text is None:
             continue
         folder = reading.path(text)
@@ -34,11 +52,11 @@ def read_problems(node: Node, reading: Reading) -> list[dict[str, str]] | None:
             )
         problems += found
     if isinstance(node, Sequence) and not node.items:
-        reading.faults.add(node.location, "problems is an empty list; name at least one folder")
+        reading.faults.add(node.location, f"{key} is an empty list; name at least one folder")
     return problems
 
 
-def _problems_in(folder: Path, item: Node, reading: Reading) -> list[dict[str, str]]:
+def _problems_in(folder: Path, item: Node, reading: Reading) -> list[Problem]:
     problems = []
     for scene in sorted(folder.rglob("scene*.yaml")):
         number = scene.stem.removeprefix("scene")
@@ -48,6 +66,5 @@ def _problems_in(folder: Path, item: Node, reading: Reading) -> list[dict[str, s
                 item.location, f"{scene} has no {request.name} beside it; add the request, or remove the scene"
             )
             continue
-        name = f"{scene.parent.name}/{number}"
-        problems.append({"name": name, "scene": str(scene), "request": str(request)})
+        problems.append(Problem(f"{scene.parent.name}/{number}", str(scene), str(request)))
     return problems

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
+DEFAULT_LAUNCH = "modular_framework_api/start_framework.launch"
+
 
 class UnresolvedReference(Exception):
     """A reference of an experiment file cannot be resolved; the message lists the allowed values."""

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Map
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from modular_framework_benchmark.experiments.distributions import (
     Distribution,
@@ -14,8 +15,11 @@ from modular_framework_benchmark.experiments.distributions import (
     read_distribution,
 )
 from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.experiments.resting_height import lowest_point, resting_height
-from modular_framework_core.files.located_yaml import Mapping, Node, Sequence, kind_of
+from modular_framework_benchmark.records.episode_settings import PlacedObject
+from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
+from modular_framework_core.files.located_yaml import Sequence as ListNode
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
 from modular_framework_simulation.errors import DescriptionError
 
@@ -45,7 +49,7 @@ class SceneObject:
     pose: dict[str, Distribution]
     surface: Distribution | None
 
-    def sampled(self, key: tuple[object, ...], index: int) -> dict[str, Any]:
+    def sampled(self, key: tuple[object, ...], index: int) -> PlacedObject:
         """Returns the object with the pose drawn for a trial.
 
         Args:
@@ -58,7 +62,7 @@ class SceneObject:
         if self.surface is not None:
             surface = self.surface.draw(generator_of(*key, "objects", index, OLD_SURFACE))
             numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"])
-        return {"name": self.name, "model": self.model, **numbers}
+        return PlacedObject(self.name, self.model, **numbers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +84,10 @@ class ObjectNodes:
     surface: Distribution | None
 
 
-def read_objects(node: Node, reading: Reading) -> list[ObjectNodes] | None:
+def read_objects(node: Node, key: str, reading: Reading) -> list[ObjectNodes] | None:
     """Reads a list of objects; it may be empty."""
-    if not isinstance(node, Sequence):
-        reading.faults.add(node.location, f"objects must be a list such as [{EXAMPLE}], found {kind_of(node)}")
+    if not isinstance(node, ListNode):
+        reading.faults.add(node.location, f"{key} must be a list such as [{EXAMPLE}], found {kind_of(node)}")
         return None
     return [found for item in node.items if (found := _read_object(item, reading)) is not None]
 
@@ -126,7 +130,7 @@ def _renamed(mapping: Mapping) -> Mapping:
     )
 
 
-def named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:
+def _named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:
     """Returns an object with its model's file; adds a fault if another object has the same name.
 
     Args:
@@ -149,3 +153,26 @@ def named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Readi
             reading.faults.add(found.node.entries[SURFACE].location, f"the model has no lowest point: {error}")
     is_path = "/" in found.model or found.model.endswith(".sdf")
     return SceneObject(name, str(file) if is_path else found.model, file, found.pose, found.surface)
+
+
+def placed_objects(
+    nodes: Sequence[ObjectNodes], launch: str, arguments: Map[str, str], reading: Reading
+) -> list[SceneObject]:
+    """Returns objects with the files of their models, and adds faults.
+
+    Args:
+        nodes: Objects of the experiment file.
+        launch: Launch file whose description package contains the models.
+        arguments: Arguments of the launch file.
+        reading: Reader that collects faults.
+    """
+    taken: set[str] = set()
+    objects = []
+    for item in nodes:
+        try:
+            file = reading.resources.model(item.model, launch, arguments, reading.folder)
+        except UnresolvedReference as error:
+            reading.faults.add(item.node.entries["model"].location, str(error))
+            continue
+        objects.append(_named_object(item, file, taken, reading))
+    return objects

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_ros.reported_figures import Figure
 
@@ -139,7 +139,7 @@ class EpisodeMeasurements:
     """Measurements of an episode.
 
     Attributes:
-        settings: Settings of the episode, as in `EpisodeSpec.settings`.
+        settings: Settings of the episode; the class belongs to the mode.
         status: Final status.
         outcome: Outcome of the task; "" without a task.
         cause: Cause of a failure.
@@ -162,7 +162,7 @@ class EpisodeMeasurements:
         folder: Folder of the episode's files.
     """
 
-    settings: Mapping[str, Any]
+    settings: EpisodeSettings
     status: EpisodeStatus
     outcome: str = ""
     cause: str = ""

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.records.episode_settings import MetricSpec
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock, Source
@@ -191,11 +191,11 @@ class MeasuredMetrics:
     faults: Mapping[str, str]
 
 
-def measure(wanted: Iterable[str | Mapping[str, Any]], episode: EpisodeMeasurements) -> MeasuredMetrics:
+def measure(wanted: Iterable[MetricSpec], episode: EpisodeMeasurements) -> MeasuredMetrics:
     """Returns the metrics of an episode.
 
     Args:
-        wanted: Entries of `metrics` of an experiment: names, or mappings with `function` and optionally `name`.
+        wanted: Metrics to measure.
         episode: Measurements of the episode.
 
     Raises:
@@ -204,12 +204,10 @@ def measure(wanted: Iterable[str | Mapping[str, Any]], episode: EpisodeMeasureme
     values: dict[str, float | None] = {}
     faults: dict[str, str] = {}
     for entry in wanted:
-        if isinstance(entry, str) and ":" not in entry:
+        if isinstance(entry, str):
             name, function = entry, find_metric(entry).measure
         else:
-            reference = str(entry if isinstance(entry, str) else entry["function"])
-            name = str((entry if isinstance(entry, Mapping) else {}).get("name") or reference.rpartition(":")[2])
-            function = load_metric(reference)
+            name, function = entry.name, load_metric(entry.function)
         try:
             value = function(episode)
             values[name] = None if value is None else float(value)

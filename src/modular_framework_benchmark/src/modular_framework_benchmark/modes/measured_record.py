@@ -63,7 +63,7 @@ def measured_record(
         spec.settings, status, outcome, cause, generation_s=generation_s, reports=(report,), folder=folder
     )
     try:
-        measured = measure(spec.settings.get("metrics", ()), measurements)
+        measured = measure(spec.settings.metrics, measurements)
     except MetricError as error:
         return broken_record(spec, str(error), watch)
     span = Span(

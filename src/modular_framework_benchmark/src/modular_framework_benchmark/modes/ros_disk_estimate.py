@@ -7,7 +7,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_simulation.sensors.camera_config import read_cameras
 from modular_framework_simulation.sensors.cameras import POINT, Camera
 
@@ -22,11 +25,10 @@ SENSORS = "/gazebo/sensors"
 UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
-def disk_text(mode: str, episodes: Sequence[EpisodeSpec]) -> str:
+def disk_text(episodes: Sequence[EpisodeSpec]) -> str:
     """Returns a line with the estimated disk space of an experiment, itemised.
 
     Args:
-        mode: Mode of the experiment.
         episodes: Episodes of the experiment.
 
     Raises:
@@ -34,10 +36,11 @@ def disk_text(mode: str, episodes: Sequence[EpisodeSpec]) -> str:
     """
     parts: dict[str, float] = {}
     for spec in episodes:
-        for name, size in _task_sizes(spec) if mode == "task" else _model_sizes(mode, spec):
+        for name, size in _sizes(spec.settings):
             parts[name] = parts.get(name, 0.0) + size
     items = ", ".join(f"{name} {size_text(size)}" for name, size in parts.items())
-    assumption = f", each {SIMULATED_S:g} s of simulated time, as long as the shipped pick" if mode == "task" else ""
+    simulated = any(isinstance(spec.settings, TaskSettings) for spec in episodes)
+    assumption = f", each {SIMULATED_S:g} s of simulated time, as long as the shipped pick" if simulated else ""
     return f"  disk: about {size_text(sum(parts.values()))} for {len(episodes)} episodes{assumption}: {items}"
 
 
@@ -48,15 +51,21 @@ def size_text(size: float) -> str:
     return f"{value:.0f} {UNITS[power]}" if value >= 10.0 else f"{value:.2g} {UNITS[power]}"
 
 
-def _task_sizes(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
-    record = spec.settings["record"]
+def _sizes(settings: EpisodeSettings) -> Iterator[tuple[str, float]]:
     yield "database", DATABASE_BYTES
+    if isinstance(settings, TaskSettings):
+        yield from _task_sizes(settings)
+    elif isinstance(settings, PlanningSettings) and settings.record.trajectories:
+        yield "trajectories", PLAN_BYTES
+
+
+def _task_sizes(settings: TaskSettings) -> Iterator[tuple[str, float]]:
     yield "logs and recordings", TEXT_BYTES + MOTION_BYTES_PER_S * SIMULATED_S
-    if record.get("video"):
+    if settings.record.video:
         yield "videos", VIDEO_BYTES_PER_S * SIMULATED_S
-    if record.get("bag"):
+    if settings.record.bag:
         yield "bags without cameras", BAG_BYTES_PER_S * SIMULATED_S
-        for camera in _cameras(spec):
+        for camera in _cameras(settings):
             pinhole = camera.pinhole
             name = (
                 f"camera '{camera.name}' in bags at most ({pinhole.width} x {pinhole.height} at {camera.rate_hz:g} Hz)"
@@ -64,16 +73,10 @@ def _task_sizes(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
             yield name, _image_bytes(camera) * camera.rate_hz * SIMULATED_S
 
 
-def _model_sizes(mode: str, spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
-    yield "database", DATABASE_BYTES
-    if mode == "planning" and spec.settings["record"].get("trajectories", True):
-        yield "trajectories", PLAN_BYTES
-
-
-def _cameras(spec: EpisodeSpec) -> list[Camera]:
+def _cameras(settings: TaskSettings) -> list[Camera]:
     """Returns the cameras of the launch's sensors_config.yaml, without cameras of models and robots."""
-    settings = preview_stack(spec.settings).preview.below(SENSORS)
-    return read_cameras(settings, SENSORS, lambda frame: "world")[0]
+    sensors = preview_stack(settings).preview.below(SENSORS)
+    return read_cameras(sensors, SENSORS, lambda frame: "world")[0]
 
 
 def _image_bytes(camera: Camera) -> float:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.grasp_reach import GraspReach
@@ -58,50 +59,51 @@ class _Prepared:
     gripper: GripperGeometry
 
 
-class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
+class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _Prepared]):
     """Runs episodes of the mode `grasps`."""
-
-    prepared_by = ("robot", "group", "gripper_joint")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Generates and checks the grasps of one scene; writes no files."""
-        settings = spec.settings
+        settings = spec.settings_of(GraspSettings)
         prepared = self.prepared(settings)
-        scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
-        method = load_method(str(settings["method"]), settings.get("method_parameters") or {})
+        scene = grasp_scene(prepared.robot.model, settings.objects, settings.target)
+        method = load_method(settings.method, settings.method_parameters)
         started_s, start = watch.elapsed_s(), time.perf_counter()
         candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
-        travels = _joint_travels(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
+        travels = _joint_travels(prepared, scene, candidates[: settings.max_checks])
         reachable = [rank for rank, travel in enumerate(travels, start=1) if travel is not None]
         outcome = "reachable" if reachable else ("out_of_reach" if candidates else "no_grasp")
         report = ComponentReport(
             component="generation",
-            name=str(settings["target"]),
+            name=settings.target,
             succeeded=bool(reachable),
             reason=_reason(method, candidates, travels, outcome) + cause,
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
             figures=_figures(candidates, travels, reachable),
-            ran=_ran(str(settings["method"]), prepared),
+            ran=_ran(settings.method_package, prepared),
         )
         status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report, folder, watch)
 
-    def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+    def prepared_by(self, settings: GraspSettings) -> tuple[Any, ...]:
+        """Returns robot, group and gripper joint."""
+        return settings.robot, settings.group, settings.gripper_joint
+
+    def prepare(self, settings: GraspSettings) -> _Prepared:
         """Returns the robot with its inverse kinematics and hand."""
-        robot = self.robot(settings["robot"])
-        group = robot.chain(str(settings["group"]))
+        robot = self.robot(settings.robot)
+        group = robot.chain(settings.group)
         try:
-            gripper = measure_gripper(robot.urdf, group.tip_link, str(settings["gripper_joint"]))
+            gripper = measure_gripper(robot.urdf, group.tip_link, settings.gripper_joint)
         except GripperGeometryError as error:
-            raise ModeError(f"gripper_joint '{settings['gripper_joint']}': {error}") from error
+            raise ModeError(f"gripper_joint '{settings.gripper_joint}': {error}") from error
         return _Prepared(robot, robot.solvers().solver(group.name), gripper)
 
 
-def _ran(method: str, prepared: _Prepared) -> UsedSoftware:
-    package = method.partition(":")[0].partition(".")[0]
+def _ran(package: str, prepared: _Prepared) -> UsedSoftware:
     version, sources = package_source(package)
     return UsedSoftware(
         methods={package: UsedMethod(version, sources)},

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject, SceneObjectError, scene_object
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.messages.scene_conversions import apply_collision_object
@@ -36,12 +37,12 @@ class GraspScene:
     others: tuple[SceneObject, ...]
 
 
-def grasp_scene(model: RobotModel, objects: Sequence[Mapping[str, Any]], target: str) -> GraspScene:
+def grasp_scene(model: RobotModel, objects: Sequence[PlacedObject], target: str) -> GraspScene:
     """Returns the scene of an episode, with the robot in its default state.
 
     Args:
         model: Robot model.
-        objects: {name, model: FILE, x, y, z [m], roll, pitch, yaw [rad]} per object, in the planning frame.
+        objects: Objects with absolute paths of their models and poses in the planning frame.
         target: Name of the object to grasp.
 
     Raises:
@@ -56,21 +57,18 @@ def grasp_scene(model: RobotModel, objects: Sequence[Mapping[str, Any]], target:
                 scene = apply_collision_object(scene, message)
                 part = scene_object(message)
                 if part is not None:
-                    (targets if item["name"] == target else others).append(part)
+                    (targets if item.name == target else others).append(part)
         except (DescriptionError, SceneObjectError, PlanningError, OSError) as error:
-            raise ModeError(f"object '{item['name']}': {error}") from error
+            raise ModeError(f"object '{item.name}': {error}") from error
     if not targets:
         raise ModeError(f"object '{target}' has no graspable collision shape; choose another target")
     return GraspScene(scene, tuple(targets), tuple(others))
 
 
-def _messages(item: Mapping[str, Any], frame: str) -> list[Any]:
-    path = Path(str(item["model"]))
+def _messages(item: PlacedObject, frame: str) -> list[Any]:
+    path = Path(item.model)
     model = read_model_text(path.read_text(encoding="utf-8"), str(path), Resources((path.parent.parent,), no_packages))
-    xyz, rpy = (tuple(float(item[key]) for key in keys) for keys in (("x", "y", "z"), ("roll", "pitch", "yaw")))
-    placed = Pose.from_xyz_rpy((xyz[0], xyz[1], xyz[2]), (rpy[0], rpy[1], rpy[2]))
+    placed = Pose.from_xyz_rpy(item.xyz, item.rpy)
     return [
-        link_to_collision_object(str(item["name"]), link, frame, placed @ link.pose)
-        for link in model.links
-        if link.collisions
+        link_to_collision_object(item.name, link, frame, placed @ link.pose) for link in model.links if link.collisions
     ]

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
@@ -29,9 +30,9 @@ from modular_framework_planning.kinematics.inverse_kinematics import InverseKine
 from modular_framework_planning.kinematics.kinematics_settings import (
     CLOSED_FORM,
     NUMERIC,
-    KinematicsSettings,
     settings_from,
 )
+from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings as SolverSettings
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_ros.reported_figures import (
     POSITION_ERROR,
@@ -62,16 +63,15 @@ class _PoseResult:
         return self.position_error_m < POSITION_TOLERANCE_M and self.rotation_error_rad < ROTATION_TOLERANCE_RAD
 
 
-class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
+class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKinematics]):
     """Runs episodes of the mode `kinematics`."""
-
-    prepared_by = ("robot", "group", "solver", "timeout", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Solves the poses of a trial; writes no files."""
-        robot, solver = self.robot(spec.settings["robot"]), self.prepared(spec.settings)
+        settings = spec.settings_of(KinematicsSettings)
+        robot, solver = self.robot(settings.robot), self.prepared(settings)
         started_s = watch.elapsed_s()
-        results = _solve_poses(robot, solver, spec)
+        results = _solve_poses(robot, solver, settings, spec.seed)
         unsolved, ended_s = [number for number, result in enumerate(results) if not result.is_solved], watch.elapsed_s()
         report = ComponentReport(
             component="kinematics",
@@ -93,13 +93,17 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
 
-    def prepare(self, settings: Mapping[str, Any]) -> InverseKinematics:
+    def prepared_by(self, settings: KinematicsSettings) -> tuple[Any, ...]:
+        """Returns the settings of the solver."""
+        return settings.robot, settings.group, settings.solver, settings.timeout, settings.parameters
+
+    def prepare(self, settings: KinematicsSettings) -> InverseKinematics:
         """Returns the solver after a first solution, which takes longer than the following ones."""
-        robot = self.robot(settings["robot"])
-        group = robot.chain(str(settings["group"]))
-        check_solver(str(settings.get("solver", "")))
+        robot = self.robot(settings.robot)
+        group = robot.chain(settings.group)
+        check_solver(settings.solver)
         solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
-        if settings.get("solver") == CLOSED_FORM and solver.method == NUMERIC:
+        if settings.solver == CLOSED_FORM and solver.method == NUMERIC:
             raise ModeError(f"solver '{CLOSED_FORM}': group '{group.name}' has no closed form; leave the key out")
         solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
         return solver
@@ -123,13 +127,13 @@ def solver_parameters(parameters: Mapping[str, Any], group: str) -> dict[str, An
     return given
 
 
-def _solver_settings(robot: Robot, settings: Mapping[str, Any]) -> KinematicsSettings:
-    group = str(settings["group"])
-    result = robot.kinematics.get(group, KinematicsSettings())
-    given = solver_parameters(settings.get("parameters") or {}, group)
+def _solver_settings(robot: Robot, settings: KinematicsSettings) -> SolverSettings:
+    group = settings.group
+    result = robot.kinematics.get(group, SolverSettings())
+    given = solver_parameters(settings.parameters, group)
     if given:
         result = settings_from({group: {"kinematics_solver": result.solver, **given}})[group]
-    return replace(result, solver=str(settings["solver"])) if settings.get("solver") else result
+    return replace(result, solver=settings.solver) if settings.solver else result
 
 
 def _home(robot: Robot) -> Array:
@@ -144,14 +148,13 @@ def _reachable_pose(robot: Robot, group: JointGroup, generator: np.random.Genera
     return model.link_transforms(model.with_mimics(positions))[group.tip_link]
 
 
-def _solve_poses(robot: Robot, solver: InverseKinematics, spec: EpisodeSpec) -> list[_PoseResult]:
-    generator = np.random.default_rng(spec.seed)
-    timeout_s = spec.settings.get("timeout")
+def _solve_poses(robot: Robot, solver: InverseKinematics, settings: KinematicsSettings, seed: int) -> list[_PoseResult]:
+    generator = np.random.default_rng(seed)
     results = []
-    for _ in range(int(spec.settings.get("poses", 100))):
+    for _ in range(settings.poses):
         target = _reachable_pose(robot, solver.group, generator)
         start = time.perf_counter()
-        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s=timeout_s)
+        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s=settings.timeout)
         results.append(_check_solution(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
     return results
 

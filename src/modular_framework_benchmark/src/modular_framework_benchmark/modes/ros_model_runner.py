@@ -5,32 +5,27 @@ from __future__ import annotations
 
 import abc
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from modular_framework_benchmark.experiments.robot_setting import ModelSettingsT, RobotSource
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_planning.errors import ModelError, PlanningError
 
 PreparedT = TypeVar("PreparedT")
 
 
-class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
-    """Runs episodes of a mode without simulation within a process.
-
-    Attributes:
-        prepared_by: Names of the settings that `prepare` uses; episodes with equal values share the result.
-    """
-
-    prepared_by: ClassVar[tuple[str, ...]]
+class ModelEpisodeRunner(abc.ABC, Generic[ModelSettingsT, PreparedT]):
+    """Runs episodes of a mode without simulation within a process."""
 
     def __init__(self) -> None:
         """Creates empty caches; robots are loaded on demand."""
-        self._robots: dict[str, Robot] = {}
+        self._robots: dict[RobotSource, Robot] = {}
         self._prepared: dict[str, PreparedT] = {}
 
     def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
@@ -62,15 +57,19 @@ class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
         """
 
     @abc.abstractmethod
-    def prepare(self, settings: Mapping[str, Any]) -> PreparedT:
+    def prepared_by(self, settings: ModelSettingsT) -> tuple[Any, ...]:
+        """Returns the settings that `prepare` uses; episodes with equal values share its result."""
+
+    @abc.abstractmethod
+    def prepare(self, settings: ModelSettingsT) -> PreparedT:
         """Returns data that episodes share, such as a solver; raises like `measure`."""
 
     def end(self, prepared: PreparedT) -> None:
         """Releases the result of `prepare`; overridden by modes that start processes."""
 
-    def prepared(self, settings: Mapping[str, Any]) -> PreparedT:
+    def prepared(self, settings: ModelSettingsT) -> PreparedT:
         """Returns the cached result of `prepare` for an episode's settings; raises like `measure`."""
-        key = json.dumps([settings.get(name) for name in self.prepared_by], sort_keys=True)
+        key = json.dumps(as_json(self.prepared_by(settings)), sort_keys=True)
         if key not in self._prepared:
             self._prepared[key] = self.prepare(settings)
         return self._prepared[key]
@@ -82,13 +81,12 @@ class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
         self._prepared.clear()
         self._robots.clear()
 
-    def robot(self, robot: str | Mapping[str, Any]) -> Robot:
+    def robot(self, robot: RobotSource) -> Robot:
         """Returns a cached robot, see :func:`load_robot`.
 
         Raises:
             ModeError: A file of the robot is missing or invalid.
         """
-        key = json.dumps(robot, sort_keys=True)
-        if key not in self._robots:
-            self._robots[key] = load_robot(robot)
-        return self._robots[key]
+        if robot not in self._robots:
+            self._robots[robot] = load_robot(robot)
+        return self._robots[robot]

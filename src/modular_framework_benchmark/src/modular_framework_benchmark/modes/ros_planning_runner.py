@@ -6,7 +6,6 @@ Each plan runs in a forked process with the same initial state, so that a seed r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
@@ -57,15 +57,14 @@ class _Prepared:
     seeded: SeededPlanning
 
 
-class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
+class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
     """Runs episodes of the mode `planning`."""
-
-    prepared_by = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Plans one problem and writes the motion to `trajectory.parquet` in the folder."""
-        prepared = self.prepared(spec.settings)
-        problem = _read_problem(spec.settings, prepared.model)
+        settings = spec.settings_of(PlanningSettings)
+        prepared = self.prepared(settings)
+        problem = _read_problem(settings, prepared.model)
         started_s, response, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         statistics: PlanStatistics | None = None
         try:
@@ -75,7 +74,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             statistics = error.statistics
             code, reason = error.code, f"{problem.name}: {error.code.name}: {error.reason}"
         ended_s = watch.elapsed_s()
-        if response is not None and spec.settings.get("record", {}).get("trajectories", True):
+        if response is not None and settings.record.trajectories:
             write_motion(response.trajectory, folder / "trajectory.parquet")
         report = ComponentReport(
             component="planning",
@@ -86,18 +85,22 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             ended_s=ended_s,
             wall_s=ended_s - started_s,
             figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
-            | (_figures(problem, response, spec.settings) if response is not None else {}),
+            | (_figures(problem, response, settings) if response is not None else {}),
             motion=_motion(response.trajectory) if response is not None else None,
             ran=_ran(statistics, prepared.model),
         )
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 
-    def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+    def prepared_by(self, settings: PlanningSettings) -> tuple[Any, ...]:
+        """Returns the settings of the pipeline."""
+        return settings.robot, settings.pipeline, settings.planner, settings.planner_parameters, settings.parameters
+
+    def prepare(self, settings: PlanningSettings) -> _Prepared:
         """Returns the robot and the started planning process, whose start is no part of a plan."""
-        robot = self.robot(settings["robot"])
+        robot = self.robot(settings.robot)
         spec = _pipeline_spec(robot, settings)
         pipeline = spec.build(robot.model, robot.solvers())
-        _check_planner(pipeline, str(settings["planner"]))
+        _check_planner(pipeline, settings.planner)
         seeded = SeededPlanning(robot.model, [spec])
         seeded.start()
         return _Prepared(robot.model, pipeline, seeded)
@@ -107,19 +110,19 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         prepared.seeded.close()
 
 
-def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
+def _pipeline_spec(robot: Robot, settings: PlanningSettings) -> PipelineSpec:
     """Returns the pipeline of the robot's configuration with the episode's parameters, at full speed.
 
     Full speed makes the durations of motions compare planners instead of scaling factors.
     """
-    name, planner = str(settings.get("pipeline") or "ompl"), str(settings["planner"])
+    name, planner = settings.pipeline or "ompl", settings.planner
     own = robot.pipelines.get(name) or {"planning_plugin": PLUGINS.get(name, name)}
-    given = pipeline_parameters(settings.get("parameters") or {}, name)
+    given = pipeline_parameters(settings.parameters, name)
     parameters = merged({**own, **FULL_SPEED}, given)
-    if settings.get("planner_parameters"):
+    if settings.planner_parameters:
         configurations = {planner: {"type": f"geometric::{planner}"}}
         configurations = merged(configurations, parameters.get("planner_configs") or {})
-        configurations = merged(configurations, {planner: settings["planner_parameters"]})
+        configurations = merged(configurations, {planner: settings.planner_parameters})
         parameters["planner_configs"] = configurations
     return read_pipeline_spec(name, parameters, robot.planning, {})
 
@@ -138,19 +141,19 @@ def _check_planner(pipeline: PlanningPipeline, planner: str) -> None:
         raise ModeError(f"planner_parameters of '{planner}': {'; '.join(faults)}")
 
 
-def _read_problem(settings: Mapping[str, Any], model: RobotModel) -> MotionProblem:
-    named, time_s = settings["problem"], float(settings.get("planning_time", 5.0))
+def _read_problem(settings: PlanningSettings, model: RobotModel) -> MotionProblem:
+    named = settings.problem
     try:
-        problem = read_problem(model, Path(named["scene"]), Path(named["request"]), time_s)
+        problem = read_problem(model, Path(named.scene), Path(named.request), settings.planning_time)
     except (PlanningError, KeyError, TypeError, ValueError) as error:
-        raise ModeError(f"{named['request']}: cannot be read: {type(error).__name__}: {error}") from error
+        raise ModeError(f"{named.request}: cannot be read: {type(error).__name__}: {error}") from error
     request = replace(
         problem.request,
-        planner_id=str(settings["planner"]),
-        group=str(settings.get("group") or problem.request.group),
-        attempts=int(settings.get("attempts", 1)),
+        planner_id=settings.planner,
+        group=settings.group or problem.request.group,
+        attempts=settings.attempts,
     )
-    return MotionProblem(str(named.get("name") or problem.name), request)
+    return MotionProblem(named.name, request)
 
 
 def _ran(statistics: PlanStatistics | None, model: RobotModel) -> UsedSoftware:
@@ -170,10 +173,10 @@ def _status(code: ErrorCode) -> EpisodeStatus:
             return EpisodeStatus.FAILED
 
 
-def _figures(problem: MotionProblem, response: PlanningAnswer, settings: Mapping[str, Any]) -> dict[Figure, float]:
+def _figures(problem: MotionProblem, response: PlanningAnswer, settings: PlanningSettings) -> dict[Figure, float]:
     """Returns the figures of `metrics.planning`; the clearance only on request, because it takes seconds."""
     figures = {PLANNING_TIME: response.total_time_s, SEARCH_TIME: response.planning_time_s}
-    if "clearance" in settings.get("metrics", ()):
+    if "clearance" in settings.metrics:
         figures[CLEARANCE] = _clearance(problem, response)
     return figures
 

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.experiments.robot_setting import RobotFiles, RobotSource
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_planning.errors import GeometryError, ModelError, PlanningError
 from modular_framework_planning.kinematics.kinematics_settings import settings_from
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -29,12 +31,12 @@ class _MeshesBeside:
             return directory_resolver(self.folder)(uri)
 
 
-def load_robot(robot: str | Mapping[str, Any]) -> Robot:
+def load_robot(robot: RobotSource) -> Robot:
     """Returns a robot.
 
     Args:
-        robot: Name of a MoveIt configuration package, or {urdf: FILE, srdf: FILE}; meshes of packages outside
-            ROS_PACKAGE_PATH are searched beside the URDF.
+        robot: MoveIt configuration package, or files; meshes of packages outside ROS_PACKAGE_PATH are searched beside
+            the URDF.
 
     Raises:
         ModeError: A file is missing or invalid.
@@ -42,15 +44,13 @@ def load_robot(robot: str | Mapping[str, Any]) -> Robot:
     try:
         return _from_package(robot) if isinstance(robot, str) else _from_files(robot)
     except (ModelError, PlanningError, GeometryError, OSError) as error:
-        raise ModeError(f"robot {robot}: {error}") from error
+        raise ModeError(f"robot {as_json(robot)}: {error}") from error
 
 
-def _from_files(files: Mapping[str, Any]) -> Robot:
-    if set(files) != {"urdf", "srdf"}:
-        raise ModeError(f"robot: found {', '.join(map(str, files)) or 'nothing'}; allowed: urdf and srdf; give both")
-    urdf, srdf = Path(str(files["urdf"])), Path(str(files["srdf"]))
+def _from_files(files: RobotFiles) -> Robot:
+    urdf = Path(files.urdf)
     text = urdf.read_text()
-    return Robot(RobotModel(text, srdf.read_text(), {}, _MeshesBeside(urdf.parent)), urdf=text)
+    return Robot(RobotModel(text, Path(files.srdf).read_text(), {}, _MeshesBeside(urdf.parent)), urdf=text)
 
 
 def _from_package(package: str) -> Robot:

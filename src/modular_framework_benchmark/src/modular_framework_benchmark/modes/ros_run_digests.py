@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
-from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTINGS, StackPreview, preview_stack
+from modular_framework_benchmark.episodes.ros_stack_launch import StackPreview, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-LOAD_SETTINGS = (*LAUNCH_SETTINGS, "robot", "method")
-"""Settings that determine what is launched or loaded."""
 FOLDERS = ("states_directory", "templates_directory")
 """Launch arguments that name a folder of the user's code."""
 LIBRARIES = tuple(
@@ -28,27 +26,26 @@ LIBRARIES = tuple(
 )
 
 
-def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
+def run_digests(episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
     """Returns the digests of all software and files, keyed by description; several digests are separated by spaces.
 
     Args:
-        mode: Mode of the experiment.
         episodes: Episodes of the experiment.
 
     Raises:
         SettingsError: A launch file is invalid.
     """
     found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
-    stacks = {json.dumps([spec.settings.get(key) for key in LOAD_SETTINGS], sort_keys=True): spec for spec in episodes}
-    packages = set(LIBRARIES)
-    for spec in stacks.values():
-        if mode == "task":
-            stack = preview_stack(spec.settings)
-            packages |= {node.package for node in stack.preview.nodes}
-            for description, digest in _launch_digests(stack):
-                found.setdefault(description, set()).add(digest[:16])
-        else:
-            packages |= _named_packages(spec.settings)
+    packages, stacks = set(LIBRARIES), dict[int, StackPreview]()
+    for settings in (spec.settings for spec in episodes):
+        packages |= settings.packages
+        if isinstance(settings, TaskSettings):
+            stack = preview_stack(settings)
+            stacks[id(stack)] = stack
+    for stack in stacks.values():
+        packages |= {node.package for node in stack.preview.nodes}
+        for description, digest in _launch_digests(stack):
+            found.setdefault(description, set()).add(digest[:16])
     for package in packages:
         found[f"package {package}"] = {package_source(package)[1][:16]}
     return {description: " ".join(sorted(digests)) for description, digests in sorted(found.items())}
@@ -59,12 +56,6 @@ def _python_version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return "none"
-
-
-def _named_packages(settings: Mapping[str, Any]) -> set[str]:
-    robot, method = settings.get("robot", ""), str(settings.get("method") or "")
-    named = {robot if isinstance(robot, str) else "", method.partition(":")[0].partition(".")[0]}
-    return named - {""}
 
 
 def _launch_digests(stack: StackPreview) -> Iterator[tuple[str, str]]:

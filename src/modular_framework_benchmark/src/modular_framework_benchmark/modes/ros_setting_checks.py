@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import rospkg
 
-from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
-from modular_framework_benchmark.experiments.mode_settings import MODES
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
+from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
+from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingFault
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
-from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingFault, SettingsCheck
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method, method_class
@@ -25,6 +27,7 @@ from modular_framework_benchmark.modes.ros_kinematics_runner import (
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
+from modular_framework_benchmark.records.episode_settings import SettingsError, as_json
 from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -40,21 +43,6 @@ from modular_framework_urdf.urdf_reader import read_urdf
 NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
 
 
-def setting_checks() -> dict[str, SettingsCheck]:
-    """Returns the checks of the settings, keyed by mode."""
-    planning, kinematics, grasps = PlanningEpisodeRunner(), KinematicsEpisodeRunner(), GraspEpisodeRunner()
-    return {
-        "task": check_task,
-        "planning": lambda settings: check_planning(planning, settings),
-        "kinematics": lambda settings: check_kinematics(kinematics, settings),
-        "grasps": lambda settings: check_grasps(grasps, settings),
-    }
-
-
-def _plain(settings: Mapping[str, Any], *without: str) -> dict[str, Any]:
-    return {key: value for key, value in settings.items() if key not in without}
-
-
 def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -> list[SettingFault]:
     """Returns the errors raised by checks, each with the keys of its setting."""
     faults = []
@@ -66,17 +54,12 @@ def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -
     return faults
 
 
-def _robot(runner: ModelEpisodeRunner[Any], settings: Mapping[str, Any]) -> tuple[Robot | None, list[SettingFault]]:
+def _robot(runner: ModelEpisodeRunner[Any, Any], read: ReadSettings[Any]) -> tuple[Robot | None, list[SettingFault]]:
     """Returns the robot and the faults of loading; None without a fault if the setting is unreadable."""
-    if "robot" not in settings:
+    if "robot" in read.unreadable:
         return None, []
-    faults = _faults_of([(("robot",), lambda: runner.robot(settings["robot"]))])
-    return (None if faults else runner.robot(settings["robot"])), faults
-
-
-def _is_whole(mode: str, settings: Mapping[str, Any]) -> bool:
-    """Returns whether all settings of a mode are present."""
-    return settings.keys() >= MODES[mode].keys.keys()
+    faults = _faults_of([(("robot",), lambda: runner.robot(read.settings.robot))])
+    return (None if faults else runner.robot(read.settings.robot)), faults
 
 
 def _check_group(robot: Robot, name: str) -> None:
@@ -90,124 +73,137 @@ def _check_chain(robot: Robot, name: str) -> None:
     robot.chain(name)
 
 
-def check_kinematics(runner: KinematicsEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
+def check_kinematics(runner: KinematicsEpisodeRunner, read: ReadSettings[KinematicsSettings]) -> CheckedSettings:
     """Checks robot, group, solver and parameters of the mode `kinematics`."""
-    group = str(settings.get("group", ""))
+    settings, group = read.settings, read.settings.group
 
     def check_parameter(name: str, value: object) -> Callable[[], object]:
         return lambda: solver_parameters({name: value}, group)
 
-    robot, faults = _robot(runner, settings)
-    faults += _faults_of([(("solver",), lambda: check_solver(str(settings.get("solver", ""))))])
-    if "group" in settings:
-        given = settings.get("parameters", {})
+    robot, faults = _robot(runner, read)
+    faults += _faults_of([(("solver",), lambda: check_solver(settings.solver))])
+    if "group" not in read.unreadable:
+        given = settings.parameters
         faults += _faults_of((("parameters", name), check_parameter(name, value)) for name, value in given.items())
-    if robot is not None and "group" in settings:
+    if robot is not None and "group" not in read.unreadable:
         faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
-    if robot is not None and not faults and _is_whole("kinematics", settings):
+    if robot is not None and not faults and not read.unreadable:
         faults += _faults_of([(("group",), lambda: runner.prepared(settings))])
         if not faults:
             return _checked_solver(runner.prepared(settings), settings)
     return CheckedSettings(tuple(faults), None)
 
 
-def _checked_solver(solver: InverseKinematics, settings: Mapping[str, Any]) -> CheckedSettings:
+def _checked_solver(solver: InverseKinematics, settings: KinematicsSettings) -> CheckedSettings:
     """Returns the settings of the mode `kinematics` with the method that solves in place of the named solver."""
-    resolved = repr(dataclasses.replace(solver.settings, solver=solver.method))
+    resolved = repr(replace(solver.settings, solver=solver.method))
     return CheckedSettings(
         (),
-        {**_plain(settings, "parameters"), "solver": resolved},
+        as_json(replace(settings, parameters={}, solver=resolved)),
         solver_substitutions([solver.settings.solver]),
     )
 
 
-def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
+def check_grasps(runner: GraspEpisodeRunner, read: ReadSettings[GraspSettings]) -> CheckedSettings:
     """Checks robot, group, gripper joint, method and its parameters of the mode `grasps`."""
-    robot, faults = _robot(runner, settings)
-    joint, group = str(settings.get("gripper_joint")), str(settings.get("group"))
-    method, parameters = str(settings.get("method")), settings.get("method_parameters", {})
+    settings = read.settings
+    robot, faults = _robot(runner, read)
+    joint = settings.gripper_joint
 
     def check_joint(robot: Robot) -> None:
         joints = [item.name for item in read_urdf(robot.urdf).joints]
         if joint not in joints:
             raise ModeError(f"gripper_joint '{joint}': the robot has none; {listing(joints)}{nearest(joint, joints)}")
 
-    if "method" in settings:
-        faults += _faults_of([(("method",), lambda: method_class(method))]) or _faults_of(
-            [(("method_parameters",), lambda: load_method(method, parameters))]
+    if "method" not in read.unreadable:
+        faults += _faults_of([(("method",), lambda: method_class(settings.method))]) or _faults_of(
+            [(("method_parameters",), lambda: load_method(settings.method, settings.method_parameters))]
         )
-    if robot is not None and "group" in settings:
-        faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
-    if robot is not None and "gripper_joint" in settings:
+    if robot is not None and "group" not in read.unreadable:
+        faults += _faults_of([(("group",), lambda: _check_chain(robot, settings.group))])
+    if robot is not None and "gripper_joint" not in read.unreadable:
         faults += _faults_of([(("gripper_joint",), lambda: check_joint(robot))])
-    if robot is not None and not faults and _is_whole("grasps", settings):
+    if robot is not None and not faults and not read.unreadable:
         faults += _faults_of([(("gripper_joint",), lambda: runner.prepared(settings))])
         if not faults:
             named = runner.prepared(settings).solver.settings.solver
-            return CheckedSettings((), dict(settings), solver_substitutions([named]))
+            return CheckedSettings((), as_json(settings), solver_substitutions([named]))
     return CheckedSettings(tuple(faults), None)
 
 
-def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
+def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSettings:
     """Checks the launch and the task of the mode `task`."""
-    if "launch" not in settings:
+    if "launch" in read.unreadable:
         return CheckedSettings((), None)
-    is_known = "arguments" in settings
+    settings, is_known = read.settings, "arguments" not in read.unreadable
     try:
         launch = preview_stack(settings).preview
     except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
-    check = LaunchCheck(launch, settings.get("parameters"), settings.get("extra_parameters", ()))
+    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters)
     found = check.faults() if is_known else check.faults_of_values()
     faults = tuple(
         SettingFault((item.key, item.name) if item.name else (item.key,), item.text)
         for item in found
-        if item.key in settings
+        if item.key not in read.unreadable
     )
-    if faults or not _is_whole("task", settings):
+    if faults or read.unreadable:
         return CheckedSettings(faults, None)
     return CheckedSettings(
         (),
         {
-            **_plain(settings, "arguments", "parameters", "launch"),
+            **as_json(replace(settings, arguments={}, parameters={}, launch="")),
             "nodes": sorted(map(repr, check.launch.nodes)),
             "parameters": {**check.resolved_parameters(), "/planner_name": repr(check.planner())},
         },
-        (*_substitutions(check.registry(), check.planner()), *solver_substitutions(named_solvers(check.kinematics()))),
+        (
+            *_substitutions(check.registry(), check.planner()),
+            *solver_substitutions(named_solvers(check.kinematics())),
+        ),
     )
 
 
-def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
+def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
+    """Returns the text of the substitution that constrained requests cause, as in the records of plans."""
+    constrained = registry.constrained_planner(planner) if registry is not None and planner is not None else ""
+    return (substitution_text(planner.planner, constrained),) if planner is not None and constrained else ()
+
+
+def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSettings]) -> CheckedSettings:
     """Checks robot, group, pipeline, planner and parameters of the mode `planning`."""
-    robot, faults = _robot(runner, settings)
+    settings = read.settings
+    robot, faults = _robot(runner, read)
     if robot is None:
         return CheckedSettings(tuple(faults), None)
-    if settings.get("group"):
-        faults += _faults_of([(("group",), lambda: _check_group(robot, str(settings["group"])))])
-    if "pipeline" not in settings:
+    if settings.group:
+        faults += _faults_of([(("group",), lambda: _check_group(robot, settings.group))])
+    if "pipeline" in read.unreadable:
         return CheckedSettings(tuple(faults), None)
-    check = _planning_check(robot, settings)
+    check = _launch_check(robot, settings)
     faults += _parameter_faults(check, settings)
-    found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS})) if "planner" in settings else None
-    return CheckedSettings(tuple(faults), {**settings, "planner": repr(found)}, _substitutions(check.registry(), found))
+    found = None
+    if "planner" not in read.unreadable:
+        found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
+    resolved = as_json(replace(settings, planner=repr(found)))
+    return CheckedSettings(tuple(faults), resolved, _substitutions(check.registry(), found))
 
 
-def _planning_check(robot: Robot, settings: Mapping[str, Any]) -> LaunchCheck:
+def _launch_check(robot: Robot, settings: PlanningSettings) -> LaunchCheck:
     """Returns the check of a move_group with the robot and the pipeline of the mode `planning`."""
-    pipeline = str(settings["pipeline"])
+    pipeline = settings.pipeline
     pipelines = {**robot.pipelines}
     pipelines.setdefault(pipeline, {"planning_plugin": PLUGINS.get(pipeline, pipeline)})
     parameters = leaves({f"{NODE.name}/planning_pipelines": pipelines, "/robot_description_planning": robot.planning})
     urdf, srdf = robot.model.source[:2]
     parameters |= {"/robot_description": urdf, "/robot_description_semantic": srdf}
     parameters[f"{NODE.name}/default_planning_pipeline"] = pipeline
-    return LaunchCheck(LaunchPreview((NODE,), parameters), settings.get("parameters"))
+    return LaunchCheck(LaunchPreview((NODE,), parameters), settings.parameters)
 
 
-def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterator[SettingFault]:
+def _parameter_faults(check: LaunchCheck, settings: PlanningSettings) -> Iterator[SettingFault]:
     """Yields the errors in the parameters of the mode `planning`, including those of its pipeline."""
-    given = leaves(settings.get("parameters", {}))
-    pipeline, unread = str(settings["pipeline"]), set()
+    given = leaves(settings.parameters)
+    pipeline, unread = settings.pipeline, set()
     for name, value in given.items():
         try:
             pipeline_parameters({name: value}, pipeline)
@@ -222,14 +218,8 @@ def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterat
             yield SettingFault(("parameters", found.name), found.text)
 
 
-def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
-    """Returns the text of the substitution that constrained requests cause, as in the records of plans."""
-    constrained = registry.constrained_planner(planner) if registry is not None and planner is not None else ""
-    return (substitution_text(planner.planner, constrained),) if planner is not None and constrained else ()
-
-
 def _planner(
-    check: LaunchCheck, settings: Mapping[str, Any], faults: list[SettingFault], pipelines: list[str]
+    check: LaunchCheck, settings: PlanningSettings, faults: list[SettingFault], pipelines: list[str]
 ) -> ResolvedPlanner | None:
     """Returns the planner of the mode `planning`, or None after adding faults.
 
@@ -242,13 +232,13 @@ def _planner(
     try:
         registry = check.registry()
         assert registry is not None
-        found = registry.resolve(str(settings["planner"]), str(settings.get("group", "")), str(settings["pipeline"]))
+        found = registry.resolve(settings.planner, settings.group, settings.pipeline)
     except UnknownNameError as error:
         hint = f"{listing(error.known)}{nearest(error.name, error.known)}"
         faults.append(SettingFault((error.what,), f"there is no {error.what} '{error.name}'; {hint}"))
         return None
     except (ModelError, PlanningError):
-        name = str(settings["pipeline"])
+        name = settings.pipeline
         text = f"there is no pipeline '{name}'; {listing(pipelines)}, or module/Class{nearest(name, pipelines)}"
         faults.append(SettingFault(("pipeline",), text))
         return None
@@ -256,8 +246,8 @@ def _planner(
     return found
 
 
-def _setting_faults(check: LaunchCheck, found: ResolvedPlanner, settings: Mapping[str, Any]) -> Iterator[SettingFault]:
-    for key, value in settings.get("planner_parameters", {}).items():
+def _setting_faults(check: LaunchCheck, found: ResolvedPlanner, settings: PlanningSettings) -> Iterator[SettingFault]:
+    for key, value in settings.planner_parameters.items():
         registry = check.registry()
         for text in registry.faults(found, {key: value}) if registry is not None else ():
             yield SettingFault(("planner_parameters", key), text.replace("; it is ignored", ""))

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, SettingsError, SettingsT
+
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSpec:
@@ -19,20 +21,34 @@ class EpisodeSpec:
         trial: Number of the scene and seed. Episodes of different methods with the same trial and the same levels of
             the other factors are a pair: they share the scene and the seeds.
         seed: Seed of all random generators of the episode, derived from the experiment's seed and the trial.
-        settings: Settings of the levels, merged: the keys of the mode (launch arguments, parameters, objects, ...).
+        settings: Settings of the levels, merged, with scene or problem; the class belongs to the mode.
     """
 
     number: int
     configuration: Mapping[str, str]
     trial: int
     seed: int
-    settings: Mapping[str, Any]
+    settings: EpisodeSettings
 
     @property
     def key(self) -> str:
         """Returns a text that identifies the episode within its experiment, independent of the order of the run."""
         levels = ",".join(f"{name}={self.configuration[name]}" for name in sorted(self.configuration))
         return f"{levels};trial={self.trial}"
+
+    def settings_of(self, kind: type[SettingsT]) -> SettingsT:
+        """Returns the settings of a mode.
+
+        Args:
+            kind: Class of the settings.
+
+        Raises:
+            SettingsError: The episode belongs to another mode.
+        """
+        if isinstance(self.settings, kind):
+            return self.settings
+        found = type(self.settings).__name__
+        raise SettingsError(f"episode {self.key!r} has {found}; allowed: {kind.__name__}; use the runner of its mode")
 
 
 class EpisodeStatus(Enum):

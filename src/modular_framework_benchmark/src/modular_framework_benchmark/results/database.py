@@ -236,14 +236,14 @@ class ResultDatabase:
     def pending(self, number: int) -> list[EpisodeSpec]:
         """Returns the unfinished episodes of an experiment in the order of the run."""
         with self._reading() as connection:
-            self._description(connection, number)
+            mode = self._description(connection, number).mode
             statement = (
                 select(EPISODES)
                 .outerjoin(RUNS, RUNS.c.id == EPISODES.c.id)
                 .where(EPISODES.c.descriptionid == number, RUNS.c.id.is_(None))
                 .order_by(EPISODES.c.number)
             )
-            return [read_spec(row) for row in connection.execute(statement)]
+            return [read_spec(row, mode) for row in connection.execute(statement)]
 
     def write(self, number: int, record: EpisodeRecord) -> bool:
         """Writes the record of an episode in one transaction.
@@ -333,6 +333,10 @@ class ResultDatabase:
             self._descriptions[number] = description_from_json(row.content)
         return self._descriptions[number]
 
+    def _mode_of(self, number: int) -> str:
+        with self._reading() as connection:
+            return self._description(connection, number).mode
+
     def _transact(self, action: Callable[[Connection], _Result]) -> _Result:
         """Runs an action in a transaction; repeats it if another process wrote the same row simultaneously."""
         for attempt in range(_ATTEMPTS):
@@ -376,10 +380,10 @@ class ResultDatabase:
             )
 
     def _import_waiting(self) -> None:
-        for waiting in waiting_records(self._address):
+        for waiting in waiting_records(self._address, self._mode_of):
             try:
                 self.write(waiting.experiment, waiting.record)
-            except (UnknownExperimentError, RecordRefusedError) as error:
+            except RecordRefusedError as error:
                 _LOG.warning("%s: the record remains unimported: %s", waiting.path, error)
                 continue
             waiting.path.unlink(missing_ok=True)

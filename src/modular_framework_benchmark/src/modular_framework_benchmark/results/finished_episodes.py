@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, column, insert, select, table, update
 
+from modular_framework_benchmark.experiments.modes import stored_settings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import ExperimentDescription, MetricKind
 from modular_framework_benchmark.results.columns import SUCCESS, insert_row
@@ -153,9 +154,15 @@ def _update_condition(connection: Connection, experiment: int, record: EpisodeRe
         connection.execute(row.where(columns.version == UNKNOWN_VERSION).values(version=version[:128]))
 
 
-def read_spec(row: Row[Any]) -> EpisodeSpec:
-    """Returns the planned episode of a row of `episodes`."""
-    return EpisodeSpec(row.number, json.loads(row.configuration), row.trial, row.seed, json.loads(row.settings))
+def read_spec(row: Row[Any], mode: str) -> EpisodeSpec:
+    """Returns the planned episode of a row of `episodes`.
+
+    Args:
+        row: Row of `episodes`.
+        mode: Mode of the experiment.
+    """
+    settings = stored_settings(mode, json.loads(row.settings))
+    return EpisodeSpec(row.number, json.loads(row.configuration), row.trial, row.seed, settings)
 
 
 def read_record(connection: Connection, row: Row[Any], description: ExperimentDescription) -> EpisodeRecord | None:
@@ -175,7 +182,7 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
     spans = connection.execute(select(SPANS).where(SPANS.c.runid == row.id).order_by(SPANS.c.place))
     status = next(each for each, value in STATUS_VALUES.items() if value == run["status"])
     return EpisodeRecord(
-        spec=read_spec(row),
+        spec=read_spec(row, description.mode),
         status=status,
         outcome=rest.outcome,
         cause=rest.cause,

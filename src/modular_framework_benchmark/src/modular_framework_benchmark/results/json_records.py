@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
 
+from modular_framework_benchmark.experiments.modes import stored_settings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind
 from modular_framework_ros.reported_figures import Clock, Source
 
@@ -19,7 +21,7 @@ def to_json(value: Any) -> str:
     """Returns a value as JSON with sorted keys, so that equal values give equal texts.
 
     Raises:
-        TypeError: The value contains something other than JSON and NumPy values, enumerations and paths.
+        TypeError: The value contains something other than JSON and NumPy values, enumerations, paths and data classes.
     """
     return json.dumps(value, sort_keys=True, default=_plain, separators=(",", ":"))
 
@@ -27,6 +29,8 @@ def to_json(value: Any) -> str:
 def _plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
+    if is_dataclass(value):
+        return as_json(value)
     if isinstance(value, PurePath):
         return str(value)
     if isinstance(value, Mapping):
@@ -83,18 +87,22 @@ def record_to_json(record: EpisodeRecord) -> str:
     )
 
 
-def record_from_json(text: str) -> EpisodeRecord:
-    """Returns the record from the text of `record_to_json`.
+def record_from_json(content: Mapping[str, Any], mode: str) -> EpisodeRecord:
+    """Returns the record from the JSON values of `record_to_json`.
+
+    Args:
+        content: JSON values.
+        mode: Mode of the experiment.
 
     Raises:
-        ValueError: The text is not JSON, or a status is unknown.
+        ValueError: A status is unknown.
         KeyError, TypeError: A field is missing or unknown.
     """
-    content = json.loads(text)
+    spec = content["spec"]
     return EpisodeRecord(
         **{
             **content,
-            "spec": EpisodeSpec(**content["spec"]),
+            "spec": EpisodeSpec(**{**spec, "settings": stored_settings(mode, spec["settings"])}),
             "status": EpisodeStatus(content["status"]),
             "spans": tuple(Span(**span) for span in content["spans"]),
         }

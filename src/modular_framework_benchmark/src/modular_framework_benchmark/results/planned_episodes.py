@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import Connection, RowMapping, column, func, insert, select, table, update
 
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.results.columns import (
     add_metric_columns,
@@ -250,8 +251,9 @@ def _insert_methods(
     """Inserts each method as a planner of Planner Arena, with the settings that all its episodes share."""
     shared: dict[str, dict[str, Any]] = {}
     for spec in all_specs.values():
-        known = shared.setdefault(spec.configuration[description.compared], dict(spec.settings))
-        for name in [each for each, value in known.items() if spec.settings.get(each) != value]:
+        settings = as_json(spec.settings)
+        known = shared.setdefault(spec.configuration[description.compared], dict(settings))
+        for name in [each for each, value in known.items() if settings.get(each) != value]:
             del known[name]
     for level in sorted(set(shared) - set(methods)):
         values = {"name": level, "settings": to_json(shared[level])}

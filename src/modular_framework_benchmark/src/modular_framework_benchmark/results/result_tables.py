@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 from sqlalchemy import Connection, Select, case, column, func, select, table
 
+from modular_framework_benchmark.experiments.modes import MODES, stored_settings
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.results.columns import SUCCESS
@@ -56,7 +57,8 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
         .where(planned.descriptionid == number)
         .order_by(planned.number)
     )
-    if description.mode == "planning":
+    mode = MODES.get(description.mode)
+    if mode is not None and "problems" in mode.keys:
         statement = statement.add_columns(planned.settings)
     columns = _read_columns(connection, statement)
     names = {value: status.value for status, value in STATUS_VALUES.items()}
@@ -69,7 +71,8 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
     frame |= _levels(columns["configuration"], description)
     frame |= {name: pd.Series(columns[name], dtype="float64") for name in metrics}
     if "settings" in columns:
-        frame["drawn_problem"] = pd.Series([_problem(text) for text in columns["settings"]], dtype="str")
+        problems = [stored_settings(description.mode, json.loads(text)).drawn_problem for text in columns["settings"]]
+        frame["drawn_problem"] = pd.Series(problems, dtype="str")
     frame[COLD_START] = frame["number"].isin(_flagged_episodes(connection, number, COLD_START))
     return pd.DataFrame(frame)
 
@@ -194,11 +197,6 @@ def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, A
     names = list(result.keys())
     rows = result.all()
     return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
-
-
-def _problem(settings: str) -> str:
-    """Returns the problem in the settings of an episode as canonical JSON."""
-    return json.dumps(json.loads(settings).get("problem"), sort_keys=True)
 
 
 def _levels(configurations: tuple[str, ...], description: ExperimentDescription) -> dict[str, Any]:

@@ -10,12 +10,13 @@ import logging
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_benchmark.records.episode import EpisodeRecord
 from modular_framework_benchmark.results.connection import DatabaseAddress
+from modular_framework_benchmark.results.errors import UnknownExperimentError
 from modular_framework_benchmark.results.json_records import record_from_json, record_to_json, to_json
 from modular_framework_core.files.atomic_files import read_text, write_atomically
 
@@ -86,10 +87,14 @@ def _require_own(path: Path) -> None:
         )
 
 
-def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
+def waiting_records(address: DatabaseAddress, mode_of: Callable[[int], str]) -> Iterator[UnwrittenRecord]:
     """Yields the records that wait for a database; an unreadable file is kept, with a warning.
 
     Files and folders that another user owns or may write are ignored.
+
+    Args:
+        address: Address of the database.
+        mode_of: Function that returns the mode of an experiment, or raises UnknownExperimentError.
     """
     for folder in waiting_folders(address):
         try:
@@ -106,6 +111,9 @@ def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
             try:
                 _require_own(path)
                 content = json.loads(read_text(path))
-                yield UnwrittenRecord(path, int(content["experiment"]), record_from_json(json.dumps(content["record"])))
+                number = int(content["experiment"])
+                yield UnwrittenRecord(path, number, record_from_json(content["record"], mode_of(number)))
+            except UnknownExperimentError as error:
+                _LOG.warning("%s: the record remains unimported: %s", path, error)
             except (OSError, ValueError, KeyError, TypeError) as error:
                 _LOG.warning("%s: not a record of an episode (%s); it is kept: repair or remove it", path, error)

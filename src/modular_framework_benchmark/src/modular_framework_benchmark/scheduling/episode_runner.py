@@ -45,7 +45,5 @@ def unrun_record(
         wall_s: Real duration [s].
         worker: Name of the worker.
     """
-    names = [str(one if isinstance(one, str) else one["name"]) for one in spec.settings.get("metrics", ())]
-    return EpisodeRecord(
-        spec, status, "", cause, begun, wall_s, None, metrics={name: None for name in names}, worker=worker
-    )
+    metrics = dict.fromkeys(spec.settings.metric_names)
+    return EpisodeRecord(spec, status, "", cause, begun, wall_s, None, metrics=metrics, worker=worker)

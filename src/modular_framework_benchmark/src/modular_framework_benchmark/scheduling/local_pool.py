@@ -132,7 +132,7 @@ class LocalPool:
     def _kill_overdue(self, worker: WorkerProcess) -> EpisodeRecord | None:
         running = worker.running
         assert running is not None
-        limit_s = float(running.spec.settings.get("time_limit", float("inf"))) + GRACE_S
+        limit_s = running.spec.settings.time_limit + GRACE_S
         if time.monotonic() - running.started < limit_s:
             return None
         self._end(worker)

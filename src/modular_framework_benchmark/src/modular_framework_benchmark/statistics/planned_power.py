@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 
 import pandas as pd
@@ -76,7 +75,7 @@ def _planned(description: ExperimentDescription, episodes: Sequence[EpisodeSpec]
         {
             "trial": spec.trial, "seed": spec.seed, "success": False, "status": "failed",
             **{name: spec.configuration[name] for name in names},
-            **({"drawn_problem": json.dumps(spec.settings["problem"])} if "problem" in spec.settings else {}),
+            **({"drawn_problem": spec.settings.drawn_problem} if spec.settings.drawn_problem else {}),
         }
         for spec in episodes
     ]  # fmt: skip

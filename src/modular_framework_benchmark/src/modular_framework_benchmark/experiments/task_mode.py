@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The mode `task`: the whole stack in simulation, started by a launch file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping as Map
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting, truth
+from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
+from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, PlacedObject, SettingsError
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
+from modular_framework_core.task_constructor.key_spelling import intended_key
+
+DEFAULT_TASK = "simulation_pick.yaml"
+OWN_ARGUMENTS = {
+    "task_constructor_script": "give it with the key task",
+    "end_with_task": "an episode needs its launch after the task has ended",
+    "seed": "each episode has its own seed, made from the experiment's key seed",
+}
+"""Launch arguments that the episodes set themselves, with the alternative for the user."""
+FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
+"""Arguments that name a file but determine neither the launched nodes nor the robot."""
+
+
+def _read_launch(node: Node, key: str, reading: Reading) -> str | None:
+    """Reads a launch file as PACKAGE/FILE or as a path."""
+    name = reading.text(node, key)
+    if name is None:
+        return None
+    given = str(reading.path(name)) if name.startswith((".", "~", "/")) else name
+    try:
+        reading.resources.launch_file(given)
+    except UnresolvedReference as error:
+        reading.faults.add(node.location, str(error))
+        return None
+    return given
+
+
+def _read_task(node: Node, key: str, reading: Reading) -> str | None:
+    """Reads a task by name or path."""
+    name = reading.text(node, key)
+    if name is None:
+        return None
+    try:
+        return reading.resources.task(name, reading.folder)
+    except UnresolvedReference as error:
+        reading.faults.add(node.location, str(error))
+    return None
+
+
+def _read_arguments(node: Node, key: str, reading: Reading) -> dict[str, str] | None:
+    """Reads launch arguments as the text that roslaunch expects."""
+    mapping = reading.mapping(node, key, "{world_file: ur5_table.world}")
+    if mapping is None:
+        return None
+    arguments: dict[str, str] = {}
+    for name, value in mapping.entries.items():
+        if name in OWN_ARGUMENTS:
+            reading.faults.add(mapping.keys[name], f"the argument '{name}' cannot be given: {OWN_ARGUMENTS[name]}")
+        elif not isinstance(value, Scalar):
+            reading.faults.add(value.location, f"the argument '{name}' must be one value, found {kind_of(value)}")
+        elif name == "simulation" and _argument_text(value).lower() not in ("true", "1"):
+            reading.faults.add(
+                value.location,
+                f"the argument 'simulation' is {_argument_text(value)}; allowed: true. An experiment places "
+                "objects and judges success in the simulated world; run the task on the robot with run_framework",
+            )
+        else:
+            arguments[name] = _argument_text(value)
+    return arguments
+
+
+def _argument_text(value: Scalar) -> str:
+    if value.value is None:
+        return ""
+    return str(value.value).lower() if isinstance(value.value, bool) else str(value.value)
+
+
+def _read_extra_parameters(node: Node, key: str, reading: Reading) -> tuple[str, ...] | None:
+    """Reads the names of parameters that the user's own nodes read."""
+    items = reading.items(node, key, "[/my_node/my_parameter]")
+    if items is None:
+        return None
+    return tuple(name for item in items if (name := reading.text(item, f"a name in {key}")) is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SuccessCriteria:
+    """Success criteria for the final state of the world; without any, the outcome of the task suffices.
+
+    Attributes:
+        object: Name of the object to be lifted and held; None for the first object.
+        lifted: Minimum height above the initial height [m]; None for 0.1 m.
+        hold_time: Simulated time between the end of the task and the check [s]; None for 2 s.
+        shake: Simulated duration of the shake after the check [s]; None for no shake.
+    """
+
+    object: str | None = None
+    lifted: float | None = None
+    hold_time: float | None = None
+    shake: float | None = None
+
+    @property
+    def lifted_m(self) -> float:
+        """Returns the minimum height [m]."""
+        return 0.1 if self.lifted is None else self.lifted
+
+    @property
+    def hold_s(self) -> float:
+        """Returns the time before the check [s]."""
+        return 2.0 if self.hold_time is None else self.hold_time
+
+
+NO_CRITERIA = SuccessCriteria()
+MAX_CRITERIA = {"lifted": 10.0, "hold_time": 3600.0}
+"""Largest values in experiment files."""
+
+
+def _read_success(node: Node, key: str, reading: Reading) -> SuccessCriteria | None:
+    mapping = reading.mapping(node, key, "{lifted: 0.10, hold_time: 2.0}")
+    known = (*MAX_CRITERIA, "object")
+    found: dict[str, Any] = {}
+    for name, value in mapping.entries.items() if mapping is not None else ():
+        if name not in known:
+            reading.faults.add_unknown(mapping.keys[name], f"the key of {key}", name, known)  # type: ignore[union-attr]
+        elif name == "object":
+            found[name] = reading.text(value, name)
+        else:
+            found[name] = reading.number(value, name, 0.0, MAX_CRITERIA[name])
+    return None if mapping is None else SuccessCriteria(**found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskSettings(EpisodeSettings):
+    """Settings of an episode of the mode `task`.
+
+    Attributes:
+        launch: Launch file as PACKAGE/FILE, or its absolute path.
+        arguments: Launch arguments.
+        parameters: ROS parameters that override those of the launch files, keyed by full name.
+        extra_parameters: Names of parameters that the user's own nodes read.
+        objects: Objects to spawn before the task starts.
+        warm: Whether the stack may be reused.
+        task: Task script; "" for the default of the launch file.
+        success: Success criteria.
+    """
+
+    launch: str = setting(_read_launch, DEFAULT_LAUNCH)
+    arguments: Map[str, str] = setting(_read_arguments, {})
+    parameters: Map[str, Any] = setting(ros_parameters, {})
+    extra_parameters: tuple[str, ...] = setting(_read_extra_parameters, ())
+    objects: tuple[PlacedObject, ...] = setting(read_objects, ())
+    warm: bool = setting(truth, True)
+    task: str = setting(_read_task, "")
+    success: SuccessCriteria = setting(_read_success, NO_CRITERIA)
+
+    @property
+    def judged_object(self) -> str:
+        """Name of the object to be lifted and held; "" if the outcome of the task suffices.
+
+        Raises:
+            SettingsError: There are success criteria, but no objects.
+        """
+        if self.success == NO_CRITERIA:
+            return ""
+        if self.success.object is None and not self.objects:
+            raise SettingsError(
+                "setting 'success' names no object, and there are no objects; add 'object', or remove 'success'"
+            )
+        return self.success.object or self.objects[0].name
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Returns the task script."""
+        return (Path(self.task),) if self.task else ()
+
+
+def _finish(
+    read: ReadSettings[TaskSettings], nodes: Sequence[ObjectNodes], reading: Reading
+) -> ReadSettings[TaskSettings]:
+    """Checks the arguments against the launch file, finds the models, and looks up the default task.
+
+    `arguments` is unreadable if an invalid argument leaves the launched nodes unknown.
+    """
+    if "launch" in read.unreadable:
+        return read
+    settings = read.settings
+    try:
+        known = reading.resources.launch_arguments(settings.launch)
+    except UnresolvedReference as error:
+        reading.faults.add(_location_of(read.node, "launch"), str(error))
+        return replace(read, unreadable=read.unreadable | {"launch"})
+    sound, decides = _sound_arguments(read.node, settings.launch, settings.arguments, known, reading)
+    task = settings.task
+    if not task and "task" not in read.unreadable:
+        task = reading.resources.task(DEFAULT_TASK, reading.folder)
+    before = len(reading.faults)
+    objects = placed_objects(nodes, settings.launch, sound, reading)
+    if len(reading.faults) == before and "objects" not in read.unreadable:
+        _check_success(read, [found.name for found in objects], reading)
+    settings = replace(settings, arguments=sound if decides else {}, task=task)
+    read = replace(read, settings=settings, objects=tuple(objects))
+    return read if decides else replace(read, unreadable=read.unreadable | {"arguments"})
+
+
+def _check_success(read: ReadSettings[TaskSettings], names: list[str], reading: Reading) -> None:
+    success = read.settings.success
+    if success.object is not None and success.object not in names:
+        location = _location_of(read.node, "success")
+        reading.faults.add_unknown(location, "the object of success", success.object, names)
+    elif success != NO_CRITERIA and not names:
+        text = "success names an object, but objects is empty; add it there"
+        reading.faults.add(_location_of(read.node, "success"), text)
+
+
+def _sound_arguments(
+    node: Mapping, launch: str, given: Map[str, str], known: Map[str, str | None], reading: Reading
+) -> tuple[dict[str, str], bool]:
+    """Returns the valid arguments, and whether they determine the launched nodes.
+
+    A misspelt name counts as the intended argument.
+    """
+    keys = node.entries.get("arguments")
+    locations = keys.keys if isinstance(keys, Mapping) else {}
+    sound = {name: value for name, value in given.items() if name in known}
+    decides = "arguments" not in node.entries or isinstance(keys, Mapping)
+    for name in given:
+        if name not in known:
+            what = f"the argument of {launch}"
+            reading.faults.add_unknown(locations[name], what, name, sorted(known), given=given)
+            meant = intended_key(name, [free for free in known if free not in given])
+            if meant is not None:
+                sound[meant] = given[name]
+            decides = decides and meant is not None
+    wrong = {"": ""}
+    while wrong:  # faults of files are found once the other values are right
+        wrong = {_argument_in(text): text for text in reading.resources.launch_faults(launch, sound)}
+        for name, text in wrong.items():
+            reading.faults.add(locations.get(name, _location_of(node, "arguments")), text)
+            is_truth = str(known.get(name)).lower() in ("true", "false")
+            decides = decides and (name in FILE_ARGUMENTS or is_truth)
+        if not wrong.keys() & sound.keys():
+            break
+        sound = {name: value for name, value in sound.items() if name not in wrong}
+    return sound, decides
+
+
+def _argument_in(fault: str) -> str:
+    """Returns the argument named in a fault; empty if there is none."""
+    named = re.search(r"argument '([^']*)'", fault)
+    return named[1] if named is not None else ""
+
+
+def _location_of(node: Mapping, key: str) -> Any:
+    return node.entries[key].location if key in node.entries else node.location
+
+
+TASK = Mode(
+    "task",
+    TaskSettings,
+    "modular_framework_benchmark.episodes.ros_task_runner:TaskEpisodeRunner",
+    "modular_framework_benchmark.modes.ros_setting_checks:check_task",
+    frozenset({"task", "generation", "planning", "execution", "grasp"}),
+    _finish,
+)

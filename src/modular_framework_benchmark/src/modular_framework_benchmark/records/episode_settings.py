@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings of an episode, and their form as JSON values in databases and records.
+
+The names of the fields are the keys of experiment files, databases and records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_type_hints
+
+
+class SettingsError(ValueError):
+    """A setting of an episode has a wrong type or value; the message names the setting."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedObject:
+    """An object with its initial pose.
+
+    Attributes:
+        name: Name of the object in the world.
+        model: Folder in the description package's models, or absolute path of an .sdf file.
+        x: Position in the world frame, with y and z [m].
+        roll: Angle in the world frame, with pitch and yaw [rad].
+    """
+
+    name: str
+    model: str
+    x: float
+    y: float
+    z: float
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+    @property
+    def xyz(self) -> tuple[float, float, float]:
+        """Returns the position [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def rpy(self) -> tuple[float, float, float]:
+        """Returns roll, pitch and yaw [rad]."""
+        return self.roll, self.pitch, self.yaw
+
+
+@dataclass(frozen=True, slots=True)
+class OwnMetric:
+    """A metric of the user.
+
+    Attributes:
+        name: Name of the metric.
+        function: FILE.py:NAME of the function that measures it, with an absolute path.
+    """
+
+    name: str
+    function: str
+
+
+MetricSpec = str | OwnMetric
+"""Name of a metric of the framework, or a metric of the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedFiles:
+    """Whether an episode keeps each kind of file."""
+
+    log: bool = True
+    trajectories: bool = True
+    bag: bool = False
+    video: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeSettings:
+    """Settings that all modes have; the class of each mode adds its own.
+
+    Attributes:
+        metrics: Metrics to measure.
+        record: Files that the episode keeps.
+        time_limit: Maximum real duration [s].
+    """
+
+    metrics: tuple[MetricSpec, ...] = ()
+    record: RecordedFiles = RecordedFiles()
+    time_limit: float = 300.0
+
+    @property
+    def metric_names(self) -> tuple[str, ...]:
+        """Returns the names of the metrics."""
+        return tuple(one if isinstance(one, str) else one.name for one in self.metrics)
+
+    @property
+    def budget_s(self) -> float | None:
+        """Returns the time budget of the planner or solver [s]; None without one."""
+        return None
+
+    @property
+    def drawn_problem(self) -> str:
+        """Returns the planning problem of the episode as text; "" in modes without problems."""
+        return ""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Returns the named files whose content determines the episode, without scene and problem."""
+        return ()
+
+    @property
+    def packages(self) -> frozenset[str]:
+        """Returns the packages that the settings name."""
+        return frozenset()
+
+
+SettingsT = TypeVar("SettingsT", bound=EpisodeSettings)
+_T = TypeVar("_T")
+
+
+def as_json(value: Any) -> Any:
+    """Returns a value as JSON values; a dataclass becomes a mapping of its fields that are not None."""
+    if is_dataclass(value):
+        content = {item.name: getattr(value, item.name) for item in fields(value)}
+        return {name: as_json(part) for name, part in content.items() if part is not None}
+    return [as_json(part) for part in value] if isinstance(value, tuple) else value
+
+
+def from_json(kind: Callable[..., _T], content: Mapping[str, Any]) -> _T:
+    """Returns the dataclass whose JSON values `as_json` gave; ignores keys of another version.
+
+    Args:
+        kind: Class of the result.
+        content: JSON values by field name.
+
+    Raises:
+        TypeError: A required field is missing.
+    """
+    hints = _hints(kind)
+    return kind(**{name: _decoded(hints[name], value) for name, value in content.items() if name in hints})
+
+
+_hints = lru_cache(get_type_hints)
+
+
+def _decoded(hint: Any, value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_decoded(get_args(hint)[0], part) for part in value)
+    kind = next((one for one in (hint, *get_args(hint)) if is_dataclass(one)), None)
+    return from_json(kind, value) if isinstance(value, Mapping) and isinstance(kind, type) else value
