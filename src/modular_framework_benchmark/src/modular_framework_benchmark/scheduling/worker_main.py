@@ -35,6 +35,7 @@ def main(arguments: list[str]) -> int:
         sys.path += [path for path in connection.recv() if path not in sys.path]
         make_runner: RunnerFactory = connection.recv()
         runner = make_runner()
+        import modular_framework_benchmark.experiments.modes  # noqa: F401  # episodes need it, and its import takes time
     except EOFError:
         return 0
     except Exception:  # any error of the mode's code is reported to the parent
