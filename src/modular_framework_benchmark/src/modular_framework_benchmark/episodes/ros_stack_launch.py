@@ -91,7 +91,13 @@ def preview_stack(settings: TaskSettings) -> StackPreview:
 
 @lru_cache(maxsize=256)
 def loaded_stack(launch: str, task: str, arguments: tuple[tuple[str, str], ...]) -> StackPreview:
-    """Returns the preview of a stack, see `TaskSettings`; cached per process."""
+    """Returns the preview of a stack; cached per process.
+
+    Args:
+        launch: Launch file, as in `TaskSettings`.
+        task: Task file, as in `TaskSettings`.
+        arguments: Names and values of the launch arguments.
+    """
     resolved = resolve_launch(TaskSettings(launch=launch, task=task, arguments=dict(arguments)))
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (resolved.package, resolved.launch_file))])[0]

@@ -168,17 +168,35 @@ def count(high: int = 1_000_000) -> ReadValue:
 
 
 def seconds(node: Node, key: str, reading: Reading) -> float | None:
-    """Reads a duration [s]."""
+    """Reads a duration [s]; None after a fault.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     return reading.number(node, f"{key} [s]", 0.001, 1e6)
 
 
 def text(node: Node, key: str, reading: Reading) -> str | None:
-    """Reads a text, which may be empty."""
+    """Reads a text, which may be empty; None after a fault.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     return "" if isinstance(node, Scalar) and node.value == "" else reading.text(node, key)
 
 
 def truth(node: Node, key: str, reading: Reading) -> bool | None:
-    """Reads a truth value."""
+    """Reads a truth value; None after a fault.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     return reading.truth(node, key)
 
 
@@ -193,7 +211,13 @@ def named_values(example: str) -> ReadValue:
 
 
 def ros_parameters(node: Node, key: str, reading: Reading) -> dict[str, Any] | None:
-    """Reads ROS parameters by full name."""
+    """Reads ROS parameters by full name; None if the value is no mapping.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     mapping = reading.mapping(node, key, "{/planner_name: RRTConnect}")
     if mapping is None:
         return None

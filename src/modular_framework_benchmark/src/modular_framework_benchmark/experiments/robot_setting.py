@@ -26,7 +26,13 @@ RobotSource = str | RobotFiles
 
 
 def read_robot(node: Node, key: str, reading: Reading) -> RobotSource | None:
-    """Reads the robot; its package or its files must exist."""
+    """Reads the robot, whose package or files must exist; None after a fault.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     if isinstance(node, Mapping):
         return _read_files(node, key, reading)
     package = reading.text(node, key)

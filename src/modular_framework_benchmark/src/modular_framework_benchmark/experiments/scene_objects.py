@@ -85,7 +85,13 @@ class ObjectNodes:
 
 
 def read_objects(node: Node, key: str, reading: Reading) -> list[ObjectNodes] | None:
-    """Reads a list of objects; it may be empty."""
+    """Reads a list of objects, which may be empty; None if the value is no list.
+
+    Args:
+        node: Value in the file.
+        key: Name of the key, for faults.
+        reading: Reader that collects faults and looks up references.
+    """
     if not isinstance(node, ListNode):
         reading.faults.add(node.location, f"{key} must be a list such as [{EXAMPLE}], found {kind_of(node)}")
         return None
