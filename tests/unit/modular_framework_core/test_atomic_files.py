@@ -84,7 +84,7 @@ def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tm
     mesh, cache = tmp_path / "block.obj", tmp_path / "cache"
     trimesh.creation.box((0.123456789, 0.123456789, 0.123456789)).export(mesh)
     parts = ConvexParts(cache)
-    refused = pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free space, or set ROS_HOME")
+    refused = pytest.raises(DescriptionError, match="block-hull.*cannot be written.*free disk space, or set ROS_HOME")
     with refused, full_disk():
         parts.hull(Mesh(mesh))
     assert list(cache.iterdir()) == []
