@@ -175,7 +175,7 @@ def test_a_model_can_be_put_elsewhere_by_topic(simulation: Any) -> None:
         (lambda: spawn("x", 0, 0, float("nan")), "give finite numbers"),
         (lambda: spawn("x", 0, 0, 1e30), "at most 10000 m"),
         (lambda: call("/gazebo/delete_model", DeleteModel, "mug"), "no model 'mug'"),
-        (lambda: call("/gazebo/delete_model", DeleteModel, "ur5_with_ezgripper"), "the robot"),
+        (lambda: call("/gazebo/delete_model", DeleteModel, "ur5_with_ezgripper"), "the controlled robot"),
         (lambda: call("/gazebo/get_link_state", GetLinkState, "table::lid", ""), "no link 'table::lid'"),
         (lambda: call("/gazebo/set_model_state", SetModelState, ModelState(model_name="mug")), "no model 'mug'"),
     ],
