@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 TESTS = Path(__file__).resolve().parent  # as tests/run resolves the paths of suites
 LEAVE_OUT = "LEAVE_OUT_FULL_ONLY"
-"""Environment variable by which tests/run tells the conftest module to leave out the tests."""
+"""Environment variable with which tests/run has the conftest module leave out the tests."""
 
 
 class Item(Protocol):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whoever waits for a node that is frozen is told its name within ten seconds of real time."""
+"""A wait for a frozen node reports the name of the node within ten seconds of real time."""
 
 from __future__ import annotations
 

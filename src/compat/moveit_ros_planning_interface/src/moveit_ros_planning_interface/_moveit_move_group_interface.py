@@ -307,7 +307,7 @@ class MoveGroupInterface:
 
         Args:
             state: moveit_msgs/RobotState in which the trajectory starts.
-            trajectory: moveit_msgs/RobotTrajectory to time anew.
+            trajectory: moveit_msgs/RobotTrajectory to retime.
             velocity_scaling_factor: Share of the velocity limits, in (0, 1].
             acceleration_scaling_factor: Share of the acceleration limits, in (0, 1].
             algorithm: Name of the time parameterisation.

@@ -65,7 +65,7 @@ class LaunchDescription(LaunchDescriptionEntity):
             conditional_inclusion: Whether this description is only visited on a condition.
 
         Returns:
-            One action per name; its `conditionally_included` tells whether the action is only visited on a condition.
+            One action per name; its `conditionally_included` is true if the action depends on a condition.
         """
         found: dict[str, DeclareLaunchArgument] = {}
         _collect(self._entities, conditional_inclusion, found)
