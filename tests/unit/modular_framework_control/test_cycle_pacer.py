@@ -181,7 +181,7 @@ def test_a_thread_that_ends_meanwhile_does_not_keep_the_loop_from_real_time(monk
     monkeypatch.setattr(os, "listdir", lambda folder: ["11", "12", "13", str(threading.get_native_id())])
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
     permit_locking(monkeypatch)
-    assert scheduling.run_in_real_time(60) == []
+    assert scheduling.run_in_real_time(60, 50) == []
     assert given == {11: 50, 13: 50, threading.get_native_id(): 60}
 
 

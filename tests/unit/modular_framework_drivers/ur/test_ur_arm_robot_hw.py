@@ -103,6 +103,15 @@ def make_rig(arm: EmulatedArm) -> Iterator[Callable[..., Rig]]:
     arm.command("slider", value=1.0)
 
 
+@pytest.fixture
+def single_processor() -> Iterator[None]:
+    """Restricts this process and the processes that it starts to one processor."""
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    yield
+    os.sched_setaffinity(0, allowed)
+
+
 @pytest.fixture(scope="module")
 def running() -> Iterator[Rig]:
     """A driver with an emulated arm of its own; it outlives faults, so tests share it."""
@@ -306,24 +315,25 @@ def scheduling(rig: Rig) -> dict[str, list[tuple[int, int]]]:
 def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitted_and_wanted(
     make_rig: Callable[..., Rig], real_time_permitted: bool
 ) -> None:
-    def check(**priorities: int) -> None:
+    def check(**priorities: tuple[int, int]) -> None:
         found = scheduling(rig)
         assert set(found) == set(priorities)
         for role, (main, *others) in found.items():
-            wanted = priorities[role] if real_time_permitted else 0
-            assert main == (os.SCHED_FIFO if wanted else os.SCHED_OTHER, wanted)
-            assert others and max(others) <= main, role  # ur-rtde and the command port have threads
+            assert others, role  # ur-rtde and the command port have threads
+            for thread, wanted in zip((main, max(others)), priorities[role], strict=True):
+                wanted *= real_time_permitted
+                assert thread == (os.SCHED_FIFO if wanted else os.SCHED_OTHER, wanted), role
 
     rig = make_rig()
-    check(state=60, control=60, emulator=30)
+    check(state=(50, 60), control=(50, 60), emulator=(65, 55))
     rig.arm.command("cut")
     rig.until(lambda: rig.hw.fault() != "")
     rig.arm.command("restore")
     rig.until(lambda: rig.resume() == "")
-    check(state=60, control=60, emulator=30)
+    check(state=(50, 60), control=(50, 60), emulator=(65, 55))
     rig.hw.close()
     rig = make_rig(real_time=False)
-    check(state=0, control=0, emulator=30)
+    check(state=(0, 0), control=(0, 0), emulator=(65, 55))
 
 
 @pytest.mark.parametrize("command", [math.nan, 7.0, 1.0])
@@ -377,6 +387,19 @@ def test_closing_stops_the_arm_and_its_program(make_rig: Callable[..., Rig]) -> 
     rig.hw.close()
     state = rig.arm.state()
     assert (state["runtime_state"], state["connections"]) == ("STOPPED", "0")
+
+
+def test_closing_stops_the_program_on_a_single_processor(single_processor: None) -> None:
+    del single_processor
+    emulated = EmulatedArm()
+    rig = Rig(emulated)
+    try:
+        rig.until(lambda: rig.hw.ready)
+        rig.hw.close()
+        assert emulated.state()["runtime_state"] == "STOPPED"
+    finally:
+        rig.hw.close()
+        emulated.close()
 
 
 def test_an_emulator_that_is_killed_is_a_lost_link(tmp_path: Any) -> None:

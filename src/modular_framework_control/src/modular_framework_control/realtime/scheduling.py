@@ -18,8 +18,8 @@ import threading
 from collections.abc import Iterator
 
 PRIORITY = 80
-OTHERS_BELOW = 10
-"""Priority difference between the loop and the other threads of its process."""
+OTHERS_PRIORITY = 70
+"""Priority of the other threads of the loop's process."""
 _SWITCH_INTERVAL_S = 2e-4
 _CYCLE_SWITCH_INTERVAL_S = 2e-3  # longer than the work of a cycle
 _NO_FULL_COLLECTIONS = 2**31 - 1
@@ -49,15 +49,16 @@ def keeping_the_interpreter() -> Iterator[None]:
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
-def run_in_real_time(priority: int = PRIORITY) -> list[str]:
-    """Gives this process real-time priority (SCHED_FIFO), highest for the calling thread, and locks its memory in RAM.
+def run_in_real_time(priority: int = PRIORITY, others_priority: int = OTHERS_PRIORITY) -> list[str]:
+    """Gives all threads of this process real-time priority (SCHED_FIFO), and locks its memory in RAM.
 
     Other threads get a real-time priority too, because the loop must wait for a thread that holds Python's interpreter,
     and other processes could preempt this thread.
 
     Args:
-        priority: Priority of the calling thread, above OTHERS_BELOW and up to 99; a process that serves the control
-            loop uses a lower priority than the loop's other threads.
+        priority: Priority of the calling thread, 1 to 99; a process that serves the control loop uses lower priorities
+            than the threads of the loop's process.
+        others_priority: Priority of the other threads, 1 to 99.
 
     Returns:
         Refused requests with reasons; empty if all were permitted.
@@ -68,7 +69,7 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
         os.sched_setscheduler(caller, os.SCHED_FIFO, os.sched_param(priority))
         for thread in set(map(int, os.listdir("/proc/self/task"))) - {caller}:
             with contextlib.suppress(ProcessLookupError):  # the thread has ended
-                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority - OTHERS_BELOW))
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(others_priority))
     except OSError as error:
         refused.append(
             f"real-time scheduling ({error.strerror}; allow it with an rtprio of {PRIORITY} in limits.conf, "

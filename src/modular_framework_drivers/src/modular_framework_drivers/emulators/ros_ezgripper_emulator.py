@@ -18,7 +18,7 @@ from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_se
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 
-_PRIORITY = 40  # the thread of the serial line has 30, as in the emulated arm
+_PRIORITY, _LINE_PRIORITY = 40, 30
 
 
 class EzGripperEmulatorNode:
@@ -59,7 +59,7 @@ class EzGripperEmulatorNode:
 
     def run(self) -> None:
         """Serves until the node is shut down, in real time if permitted, then disconnects the serial line."""
-        run_in_real_time(_PRIORITY)  # servos respond on time even on a busy computer
+        run_in_real_time(_PRIORITY, _LINE_PRIORITY)  # servos respond on time even on a busy computer
         rospy.spin()
         self._commands.close()
         self._line.close()

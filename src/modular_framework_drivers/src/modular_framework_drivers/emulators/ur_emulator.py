@@ -31,7 +31,7 @@ from modular_framework_drivers.emulators.ur_rtde_server import REFUSALS, RtdeSer
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901
-_PRIORITY = 30  # below the control loop and its threads, above other processes
+_PRIORITY, _OTHERS_PRIORITY = 65, 55  # below the control loop, above the driver, which may wait in a busy loop
 _MAX_MISSED_CYCLES = 25  # cycles; after a longer delay, the controller skips the missed cycles
 
 
@@ -88,7 +88,7 @@ class UrEmulator:
 
     def run(self) -> None:
         """Serves until `stop`, with real-time priority if permitted."""
-        run_in_real_time(_PRIORITY)
+        run_in_real_time(_PRIORITY, _OTHERS_PRIORITY)
         period_s = self.controller.period_s
         next_s = time.monotonic() + period_s
         while not self._stopping.is_set():

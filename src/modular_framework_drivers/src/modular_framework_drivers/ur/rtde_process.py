@@ -6,7 +6,8 @@ faults; neither may affect the control loop. Each process serves one connection:
 parent starts a new process. If the parent has ended, the process stops the arm and ends.
 
 Once connected, both processes use real-time scheduling if requested and permitted, with a lower priority than the
-control loop.
+control loop. ur-rtde waits in a busy loop for data that its receiving thread reads, so this thread has the higher priority
+of the two.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from modular_framework_drivers.ur.arm_messages import (
 from modular_framework_drivers.ur.delay_watch import ConnectionEndedError, DelayWatch
 from modular_framework_drivers.ur.state_watch import ModeConfirmation, SilenceWatch, is_plausible
 
-_PRIORITY = 60  # the control loop has 80
+_PRIORITY, _RECEIVING_PRIORITY = 50, 60  # the threads of the control loop have 70 and 80
 _POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
 _FAILURE_TIMEOUT_S = 1.0  # for the cause of the failure to enter the queue
@@ -144,7 +145,7 @@ def _send(channel: socket.socket, message: bytes) -> None:
 def _take_priority(options: argparse.Namespace) -> None:
     """Requests real-time scheduling if enabled; the control loop already logs a refusal of its own request."""
     if options.real_time:
-        run_in_real_time(_PRIORITY)
+        run_in_real_time(_PRIORITY, _RECEIVING_PRIORITY)
 
 
 def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
