@@ -9,6 +9,7 @@ import logging
 import math
 import os
 import re
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -295,21 +296,27 @@ def test_a_pause_in_the_midst_of_commands_is_none_either(rig: Rig) -> None:
     assert rig.positions == pytest.approx([position + 0.09 for position in start], abs=1e-3)
 
 
-def scheduling(rig: Rig) -> dict[str, list[tuple[int, int]]]:
-    """Policy and priority of all threads of the emulator and of the driver's two processes, the main thread first."""
+def processes(rig: Rig) -> dict[str, Path]:
+    """Folders in /proc of the emulator and of the driver's two processes, by role."""
     modules = {"modular_framework_drivers.emulators.ur_emulator", "modular_framework_drivers.ur.rtde_process"}
     found = {}
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError):
             line = (entry / "cmdline").read_bytes().decode().split("\0") if entry.name.isdigit() else []
             if modules & set(line) and rig.arm.address in line:
-                threads = sorted((thread.name for thread in (entry / "task").iterdir()), key=entry.name.__ne__)
-                name = line[3] if line[3] in ("state", "control") else "emulator"
-                found[name] = [
-                    (os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority)
-                    for thread in map(int, threads)
-                ]
+                found[line[3] if line[3] in ("state", "control") else "emulator"] = entry
     return found
+
+
+def scheduling(rig: Rig) -> dict[str, list[tuple[int, int]]]:
+    """Policy and priority of all threads of these processes, the main thread first."""
+    return {
+        role: [
+            (os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority)
+            for thread in map(int, sorted((task.name for task in (entry / "task").iterdir()), key=entry.name.__ne__))
+        ]
+        for role, entry in processes(rig).items()
+    }
 
 
 def test_the_processes_that_hold_the_link_run_in_real_time_where_that_is_permitted_and_wanted(
@@ -400,6 +407,16 @@ def test_closing_stops_the_program_on_a_single_processor(single_processor: None)
     finally:
         rig.hw.close()
         emulated.close()
+
+
+def test_closing_reports_a_program_that_was_not_stopped(
+    make_rig: Callable[..., Rig], caplog: pytest.LogCaptureFixture
+) -> None:
+    rig = make_rig()
+    os.kill(int(processes(rig)["control"].name), signal.SIGSTOP)
+    rig.hw.close()
+    assert rig.arm.state()["runtime_state"] == "PLAYING"
+    assert f"arm at {rig.arm.address}: the program was not stopped within 3 s" in caplog.text
 
 
 def test_an_emulator_that_is_killed_is_a_lost_link(tmp_path: Any) -> None:

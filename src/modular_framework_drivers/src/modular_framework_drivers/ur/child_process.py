@@ -69,8 +69,12 @@ class ChildProcess:
         except OSError:
             return False
 
-    def end(self, patience_s: float = 0.0) -> None:
-        """Ends the process: waits up to `patience_s` [s], then kills it; may be called twice."""
+    def end(self, patience_s: float = 0.0) -> bool:
+        """Ends the process: waits up to `patience_s` [s], then kills the process; may be called twice.
+
+        Returns:
+            Whether the process ended without being killed.
+        """
         self.ended = True
         self._socket.close()
         try:
@@ -78,3 +82,5 @@ class ChildProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+            return False
+        return True

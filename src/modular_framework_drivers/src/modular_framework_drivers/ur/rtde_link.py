@@ -257,8 +257,12 @@ class RtdeLink:
                 self._log_start_failure(error)
         if self._states is not None:
             self._states.process.end()
-        if self._control is not None:
-            self._control.process.end(_STOP_PATIENCE_S)
+        if self._control is not None and not self._control.process.end(_STOP_PATIENCE_S):
+            LOGGER.error(
+                "arm at %s: the program was not stopped within %g s and may still run; stop it at the teach pendant",
+                self._settings.address,
+                _STOP_PATIENCE_S,
+            )
         self._states = self._control = None
 
     def _log_start_failure(self, error: OSError) -> None:
