@@ -35,18 +35,24 @@ class SteadyActionClient(actionlib.SimpleActionClient):
 
 
 def is_connected(client: actionlib.SimpleActionClient) -> bool:
-    """Returns whether an action server and a client are connected on all topics of the action, in both directions.
+    """Returns whether an action server and a client are connected on all topics of the action, in both directions."""
+    return not unconnected_topics(client)
+
+
+def unconnected_topics(client: actionlib.SimpleActionClient) -> list[str]:
+    """Returns the topics of an action on which a client and a server are not connected; empty if all are connected.
 
     rospy counts a subscriber's connection before the publisher has accepted it, and a result published until then is
-    lost. The publisher's name is known only after that, so the names are compared. Does not use rospy's clock.
+    lost. The publisher's name is known only after that, so the names are compared. Does not use rospy's clock. With
+    several servers, the result is about the server with the most connected topics.
     """
     inner = client.action_client
-    goal, cancel = (topic.impl for topic in (inner.pub_goal, inner.pub_cancel))
-    subscribed = [topic.impl for topic in (inner.status_sub, inner.result_sub, inner.feedback_sub)]
-    if None in (goal, cancel, *subscribed):  # unregistered: rospy is shutting down
-        return False
-    return any(
-        cancel.has_connection(server.endpoint_id)
-        and all(any(link.callerid_pub == server.endpoint_id for link in topic.connections) for topic in subscribed)
-        for server in goal.connections
-    )
+    published, subscribed = (inner.pub_goal, inner.pub_cancel), (inner.status_sub, inner.result_sub, inner.feedback_sub)
+    names = [topic.name for topic in (*published, *subscribed)]
+    topics = [topic.impl for topic in (*published, *subscribed)]
+    if None in topics:  # unregistered: rospy is shutting down
+        return names
+    peers = [{connection.endpoint_id for connection in topic.connections} for topic in topics[: len(published)]]
+    peers += [{connection.callerid_pub for connection in topic.connections} for topic in topics[len(published) :]]
+    unconnected = [[name for name, nodes in zip(names, peers, strict=True) if server not in nodes] for server in peers[0]]
+    return min(unconnected, key=len, default=names)

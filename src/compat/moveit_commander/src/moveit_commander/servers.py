@@ -12,7 +12,7 @@ import rospy
 from actionlib import CommState
 from rosgraph.names import ns_join
 
-from modular_framework_ros.action_client import SteadyActionClient, is_connected
+from modular_framework_ros.action_client import SteadyActionClient, is_connected, unconnected_topics
 from modular_framework_ros.calls import CallError, call_service, wait_for_service, wait_until
 from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from moveit_commander.exception import ServerError
@@ -103,7 +103,8 @@ class ActionCaller:
             if rospy.is_shutdown() or 0.0 < timeout_s <= time.monotonic() - begun:
                 raise ServerError(
                     f"action {self.name}: Unable to connect to its server within allotted time "
-                    f"({timeout_s:g}s); does move_group run, and does it have this capability?"
+                    f"({timeout_s:g}s); does move_group run, and does it have this capability? "
+                    f"Not connected: {', '.join(unconnected_topics(self._client))}"
                 )
             self._refuse_frozen_nodes(begun)
             time.sleep(POLL_PERIOD_S)
