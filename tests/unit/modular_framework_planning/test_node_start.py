@@ -59,7 +59,7 @@ def test_a_checker_that_cannot_check_the_scene_keeps_the_node_from_starting(
         pipelines=SimpleNamespace(close=lambda: None),
         new_checker=new_checker,
     )
-    for name in ("prepare", "widen_backlog", "compile_all"):
+    for name in ("prepare", "compile_all"):
         monkeypatch.setattr(node, name, lambda: None)
     monkeypatch.setattr(node, "cache_is_empty", lambda: False)
     monkeypatch.setattr(node, "build_context", lambda: context)

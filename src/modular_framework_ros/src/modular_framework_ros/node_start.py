@@ -14,8 +14,8 @@ def run_node(module: str, function: str = "main") -> NoReturn:
 
     An interrupt (SIGINT) before the node handles signals ends the process without a traceback: roslaunch interrupts all
     nodes when a required node has died, and the user needs to see the reason of that death. An interrupt while rospy
-    starts the node ends the process too. Publishers of the node send without switching threads. An invalid parameter
-    ends the node with an error in the log.
+    starts the node ends the process too. Publishers of the node send without switching threads, and a client that sends
+    nothing does not delay other clients. An invalid parameter ends the node with an error in the log.
 
     Args:
         module: Full name of the module.
@@ -24,10 +24,12 @@ def run_node(module: str, function: str = "main") -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     import rospy
 
+    from modular_framework_ros.inbound_connections import accept_connections_at_once
     from modular_framework_ros.node_handle import ParameterError
     from modular_framework_ros.ros_direct_publishing import publish_directly
 
     publish_directly()
+    accept_connections_at_once()
     try:
         sys.exit(getattr(importlib.import_module(module), function)())
     except ParameterError as error:

@@ -14,6 +14,7 @@ from rosgraph.names import ns_join
 
 from modular_framework_ros.action_client import SteadyActionClient, is_connected, unconnected_topics
 from modular_framework_ros.calls import CallError, call_service, wait_for_service, wait_until
+from modular_framework_ros.inbound_connections import accept_connections_at_once
 from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from moveit_commander.exception import ServerError
 
@@ -42,6 +43,7 @@ class Servers:
         Args:
             ns: Namespace of the move_group node's endpoints; "" for the namespace of this node.
         """
+        accept_connections_at_once()  # also for the topics of the user's script
         self._ns = ns
         self._actions: dict[str, ActionCaller] = {}
 

@@ -31,7 +31,6 @@ from modular_framework_control.ros.ros_controller_manager import RosControllerMa
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.parameter_declarations import parameters_below
 from modular_framework_ros.ros_node_handle import RosNodeHandle
-from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_ros.shutdown import hold_shutdown
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
@@ -293,7 +292,6 @@ def main() -> int:
         signal.signal(number, on_signal)
     receive_in_pieces()
     rospy.init_node("robot_hw", disable_signals=True)
-    widen_backlog()
     finished = hold_shutdown(ended)
     node: RobotHwNode | None = None
     try:

@@ -24,7 +24,6 @@ from modular_framework_core.managers.ros_named_files import (
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
 from modular_framework_ros.declared_parameters import DeclaredParameters
-from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_ros.start_up import start_timeout
 
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
@@ -38,7 +37,6 @@ def start(node_name: str) -> list[str]:
     it at every log message, which takes half the time of a request.
     """
     rospy.init_node(node_name)
-    widen_backlog()
     if not rospy.has_param(TOPICS_IN_LOG_PARAMETER):
         rospy.set_param(TOPICS_IN_LOG_PARAMETER, False)
     gc.freeze()  # garbage collection over all modules took 20 ms at every tenth loaded file

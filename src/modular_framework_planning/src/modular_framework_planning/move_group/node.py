@@ -57,7 +57,6 @@ from modular_framework_planning.planning_interface.planning_request import Sampl
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.process_setup.garbage_collection import freeze_loaded_objects
 from modular_framework_planning.process_setup.many_threads import prepare
-from modular_framework_ros.service_backlog import widen_backlog
 
 # All endpoints by their names in MoveIt's parameters `capabilities` and `disable_capabilities`
 CAPABILITIES = (
@@ -152,7 +151,6 @@ def main() -> int:
     start = time.monotonic()
     prepare()
     rospy.init_node("move_group")
-    widen_backlog()
     try:
         context = build_context()
         warm_up(context)

@@ -20,7 +20,6 @@ from modular_framework_control.ros.ros_controller_manager import RosControllerMa
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
-from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
@@ -323,7 +322,6 @@ def main() -> int:
         Exit code: 0 after a regular shutdown, 1 if the world is invalid or the loop failed.
     """
     init_node()
-    widen_backlog()
     try:
         parameters = DeclaredParameters(_PACKAGE, "simulation").all()
         if parameters["~verbose"]:

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Accepts all connections to a node's topics and services at once.
+
+rospy reads the header of a connection before it accepts the next one. A client that sends nothing or another protocol,
+such as a port scanner or a caller of a dead node whose port is used again, would keep all further clients waiting until
+it closes its connection. In addition, rospy's queue holds five pending connections, and every service call needs one or
+two: Linux drops the sixth, and its client retries after a second.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+
+from rospy.impl import tcpros_base
+
+BACKLOG = 128
+"""Number of pending connections."""
+_Handler = Callable[[socket.socket, tuple[str, int]], None]
+
+
+class _ParallelServer(tcpros_base.TCPServer):  # type: ignore[misc]
+    def __init__(self, inbound_handler: _Handler, port: int = 0) -> None:
+        super().__init__(_on_own_thread(inbound_handler), port)
+        self.server_sock.listen(BACKLOG)
+
+
+def accept_connections_at_once() -> None:
+    """Reads the header of each connection on a thread of its own; call before or after rospy.init_node, or both."""
+    tcpros_base.TCPServer = _ParallelServer
+    running = getattr(getattr(tcpros_base, "_tcpros_server", None), "tcp_ros_server", None)
+    if running is not None and not isinstance(running, _ParallelServer):
+        running.inbound_handler = _on_own_thread(running.inbound_handler)
+        running.__class__ = _ParallelServer
+        running.server_sock.listen(BACKLOG)  # the length of the queue may be changed at any time
+
+
+def _on_own_thread(handler: _Handler) -> _Handler:
+    def handle(client: socket.socket, address: tuple[str, int]) -> None:
+        threading.Thread(target=handler, args=(client, address), name="inbound_connection", daemon=True).start()
+
+    return handle
