@@ -112,6 +112,7 @@ def pan_joint() -> tuple[float, float]:
 def test_a_motion_ends_with_the_name_of_the_frozen_node(
     commander: ArmCommander, arm: MoveGroupCommander, freeze: Callable[[str], None], client: str, node: str
 ) -> None:
+    until(lambda: abs(pan_joint()[1]) < 0.005, "the arm at rest: its last motion was cancelled once its node continued")
     far = START if pan_joint()[0] < 1.2 else {**START, "shoulder_pan_joint": 0.8}
     plan = commander.plan_to_joint_value_target(far).trajectory
     motion = Wait(lambda: commander.execute_plan(plan) if client == "arm commander" else arm.execute(plan))
