@@ -54,5 +54,7 @@ def unconnected_topics(client: actionlib.SimpleActionClient) -> list[str]:
         return names
     peers = [{connection.endpoint_id for connection in topic.connections} for topic in topics[: len(published)]]
     peers += [{connection.callerid_pub for connection in topic.connections} for topic in topics[len(published) :]]
-    unconnected = [[name for name, nodes in zip(names, peers, strict=True) if server not in nodes] for server in peers[0]]
+    unconnected = [
+        [name for name, nodes in zip(names, peers, strict=True) if server not in nodes] for server in peers[0]
+    ]
     return min(unconnected, key=len, default=names)

@@ -6,8 +6,8 @@ faults; neither may affect the control loop. Each process serves one connection:
 parent starts a new process. If the parent has ended, the process stops the arm and ends.
 
 Once connected, both processes use real-time scheduling if requested and permitted, with a lower priority than the
-control loop. ur-rtde waits in a busy loop for data that its receiving thread reads, so this thread has the higher priority
-of the two.
+control loop. ur-rtde waits in a busy loop for data that its receiving thread reads, so the receiving thread has the
+higher priority.
 """
 
 from __future__ import annotations
