@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from queue import Queue
 from typing import Any
 
@@ -18,9 +18,9 @@ from modular_framework_ros.inbound_connections import BACKLOG, accept_connection
 class Node:
     """The server of topics and services of a node."""
 
-    def __init__(self) -> None:
+    def __init__(self, server: tcpros_base.TCPROSServer) -> None:
         self.headers: Queue[dict[str, str]] = Queue()
-        self.server = tcpros_base.TCPROSServer()
+        self.server = server
         self.server.topic_connection_handler = self._accept
 
     def _accept(self, client: Any, address: Any, header: dict[str, str]) -> None:
@@ -31,46 +31,48 @@ class Node:
         return socket.create_connection(("127.0.0.1", self.server.tcp_ros_server.port), timeout=10.0)
 
 
-@pytest.fixture
-def make_node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Node]]:
+@pytest.fixture(autouse=True)
+def local(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
     monkeypatch.setattr(tcpros_base, "TCPServer", tcpros_base.TCPServer)  # restored after the test
-    nodes: list[Node] = []
-
-    def make() -> Node:
-        nodes.append(Node())
-        return nodes[-1]
-
-    yield make
-    for node in nodes:
-        node.server.shutdown()
 
 
-@pytest.mark.parametrize("running", [False, True])
-def test_a_subscriber_is_accepted_while_another_client_sends_no_header(
-    make_node: Callable[[], Node], running: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    node = make_node()
-    monkeypatch.setattr(tcpros_base, "_tcpros_server", node.server)
-    if running:
-        node.server.start_server()
+@pytest.fixture
+def new_node() -> Iterator[Node]:
+    """A node that starts its server after the call of `accept_connections_at_once`."""
     accept_connections_at_once()
-    accept_connections_at_once()
+    node = Node(tcpros_base.TCPROSServer())
     node.server.start_server()
-    with node.connection() as silent, node.connection() as other_protocol, node.connection() as subscriber:
+    yield node
+    node.server.shutdown()
+
+
+@pytest.fixture
+def running_node() -> Iterator[Node]:
+    """A node whose server runs before the call of `accept_connections_at_once`."""
+    node = Node(tcpros_base.init_tcpros_server())  # the server of this process
+    node.server.start_server()
+    accept_connections_at_once()
+    accept_connections_at_once()
+    yield node
+    node.server.shutdown()
+
+
+@pytest.mark.parametrize("kind", ["new_node", "running_node"])
+def test_a_subscriber_is_accepted_while_another_client_sends_no_header(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    node: Node = request.getfixturevalue(kind)
+    with node.connection(), node.connection() as other_protocol, node.connection() as subscriber:
         other_protocol.sendall(b"POST /RPC2 HTTP/1.1\r\n\r\n")
         write_ros_handshake_header(subscriber, {"topic": "/joint_states"})
         assert node.headers.get(timeout=10.0) == {"topic": "/joint_states"}
-        silent.close()
 
 
-def test_many_connections_may_be_pending(make_node: Callable[[], Node]) -> None:
-    accept_connections_at_once()
-    node = make_node()
-    node.server.start_server()
-    clients = [node.connection() for _ in range(BACKLOG)]
+def test_many_connections_may_be_pending(new_node: Node) -> None:
+    clients = [new_node.connection() for _ in range(BACKLOG)]
     for number, client in enumerate(clients):
         write_ros_handshake_header(client, {"topic": f"/topic_{number}"})
-    assert {node.headers.get(timeout=10.0)["topic"] for _ in clients} == {f"/topic_{n}" for n in range(BACKLOG)}
+    assert {new_node.headers.get(timeout=10.0)["topic"] for _ in clients} == {f"/topic_{n}" for n in range(BACKLOG)}
     for client in clients:
         client.close()
