@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The window that launch files start for use_gui:=true publishes joint states; sources and followers are in them."""
+"""The window of use_gui:=true publishes joint states, including values of sources and of mimic joints."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def wait_for(expected: list[float]) -> Any:
     raise AssertionError(f"the last positions are {state.position}, expected {expected}")
 
 
-def test_the_zeros_and_what_follows_them_are_published(window: RosSession) -> None:
+def test_zero_positions_and_their_mimic_joints_are_published(window: RosSession) -> None:
     state = wait_for([0.123456, -0.123456, 2 * 0.123456 + 0.5])
     assert list(state.name) == ["turn", "mirror", "wheel"]
 
 
-def test_a_source_is_published_with_what_follows_it(window: RosSession) -> None:
+def test_positions_of_a_source_are_published_with_their_mimic_joints(window: RosSession) -> None:
     publisher = rospy.Publisher("/hand/joint_states", JointState, queue_size=1, latch=True)
     publisher.publish(JointState(name=["turn"], position=[0.7654321]))
     wait_for([0.7654321, -0.7654321, 2 * 0.7654321 + 0.5])
@@ -65,7 +65,7 @@ def test_joint_states_come_at_the_rate(window: RosSession) -> None:
     assert stamps[10] - stamps[0] > 1.5, "ten periods of 1/5 s; of the default rate, 1 s"
 
 
-def test_wrong_parameters_end_the_node_with_what_is_allowed(window: RosSession) -> None:
+def test_an_invalid_parameter_ends_the_node_with_the_allowed_values(window: RosSession) -> None:
     command = ["rosrun", "joint_state_publisher_gui", "joint_state_publisher_gui", "__name:=wrong", "_rate:=-1"]
     answer = subprocess.run(command, env=window.env, capture_output=True, text=True, timeout=60, check=False)
     assert answer.returncode == 1
@@ -73,7 +73,7 @@ def test_wrong_parameters_end_the_node_with_what_is_allowed(window: RosSession) 
 
 
 def test_a_source_may_be_the_topic_that_the_node_publishes(window: RosSession) -> None:
-    """Values of others count, and values of the node itself do not come back."""
+    """The node adopts values of other nodes and ignores its own messages."""
     command = ["rosrun", "joint_state_publisher", "joint_state_publisher", "__name:=own_source", "_rate:=20",
                "_source_list:=[shared_states]", "joint_states:=shared_states"]  # fmt: skip
     states: list[JointState] = []

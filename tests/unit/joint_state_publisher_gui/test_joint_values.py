@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joints that are moved by hand keep their limits, the others follow, and sources are taken over as they are."""
+"""Independent joints keep their limits, mimic joints follow, and values of sources are adopted unchanged."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_mimic_joints_follow_through_a_chain(robot: Robot) -> None:
     assert found["other_finger"] == pytest.approx(-2 * 0.03 + 0.01) and found["tip"] == pytest.approx(-0.05 + 0.5)
 
 
-def test_mimic_joints_are_moved_by_hand_if_their_tags_are_not_used(robot: Robot) -> None:
+def test_mimic_joints_are_independent_without_use_mimic_tags(robot: Robot) -> None:
     joints = slider_joints(robot, SliderSettings(use_mimic_tags=False))
     assert set(joints.free) == set(MOVABLE) and not joints.following
 
@@ -65,7 +65,7 @@ def test_dependent_joints_follow_as_mimic_joints_do(robot: Robot) -> None:
         values.set_position("turn", 0.0)
 
 
-def test_zeros_are_where_joints_begin_and_are_centred_at(robot: Robot) -> None:
+def test_zeros_are_the_positions_at_startup_and_after_centring(robot: Robot) -> None:
     joints = slider_joints(robot, SliderSettings(zeros={"turn": 1.25, "lift": 0.123456789, "wheel": 0.0}))
     values = JointValues(joints)
     values.randomise(random.Random(1))
@@ -76,7 +76,7 @@ def test_zeros_are_where_joints_begin_and_are_centred_at(robot: Robot) -> None:
     assert not joints.warnings
 
 
-def test_zeros_and_dependent_joints_that_do_not_fit_are_warned_of(robot: Robot) -> None:
+def test_unusable_zeros_and_dependent_joints_cause_warnings(robot: Robot) -> None:
     settings = SliderSettings(zeros={"turn": 9.0, "trun": 1.0}, dependent_joints={"nose": Mimic("lift", 1.0, 0.0)})
     joints = slider_joints(robot, settings)
     text = "\n".join(joints.warnings)
@@ -84,7 +84,7 @@ def test_zeros_and_dependent_joints_that_do_not_fit_are_warned_of(robot: Robot) 
     assert "no movable joint 'trun'; allowed: lift, turn" in text and "no movable joint 'nose'" in text
 
 
-def test_a_position_set_by_hand_keeps_the_limits(robot: Robot) -> None:
+def test_a_position_set_in_the_window_keeps_the_limits(robot: Robot) -> None:
     values = values_of(robot)
     values.set_position("turn", 5.0)
     values.set_position("wheel", 4.0)
@@ -104,7 +104,7 @@ def test_random_positions_keep_the_limits_and_differ(robot: Robot) -> None:
     assert len(seen) == 50
 
 
-def test_a_source_is_taken_over_as_it_is(robot: Robot) -> None:
+def test_values_of_a_source_are_adopted_unchanged(robot: Robot) -> None:
     values = values_of(robot)
     values.receive(["wheel", "nose", "finger"], [7.654321, 1.0, 0.0123456789], [], [1.0, 2.0, 3.0])
     found = positions(values)
@@ -114,7 +114,7 @@ def test_a_source_is_taken_over_as_it_is(robot: Robot) -> None:
     assert found["other_finger"] == pytest.approx(-2 * 0.0123456789 + 0.01)
 
 
-def test_velocities_of_followers_are_scaled(robot: Robot) -> None:
+def test_velocities_of_mimic_joints_are_scaled(robot: Robot) -> None:
     values = values_of(robot, velocities=True)
     assert values.arrays().velocities == (0.0,) * len(MOVABLE)
     values.receive(["finger"], [], [0.5], [])
@@ -128,7 +128,7 @@ def test_positions_may_be_unknown_until_a_joint_is_moved(robot: Robot) -> None:
     assert len(values.arrays().positions) == len(MOVABLE)
 
 
-def test_a_sweep_goes_back_and_forth_and_round(robot: Robot) -> None:
+def test_a_sweep_reverses_at_limits_and_wraps_continuous_joints(robot: Robot) -> None:
     values = values_of(robot)
     seen: dict[str, list[float]] = {"turn": [], "wheel": []}
     for _ in range(200):
@@ -152,7 +152,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("message", BROKEN)
-def test_a_description_that_cannot_be_moved_is_refused(message: str) -> None:
+def test_an_invalid_joint_is_refused(message: str) -> None:
     kind, inner = BROKEN[message]
     text = f'<robot name="r"><link name="l"/><link name="m"/>\n<joint name="a" type="{kind}"><parent link="l"/>'
     with pytest.raises(ValueError, match="URDF joint 'a'|robot_description:2") as caught:

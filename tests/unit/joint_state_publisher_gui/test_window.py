@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a user does in the window moves the joints, and what others set is shown."""
+"""Input in the window moves the joints, and the window displays values that other components set."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def application() -> Iterator[QApplication]:
 
 
 class Desk:
-    """A window, its values, and what is in it by name."""
+    """Window with its joint values; finds widgets by name."""
 
     def __init__(self, robot: Robot, rows: int = 0) -> None:
         joints = slider_joints(robot, SliderSettings(zeros={"turn": 0.12345}))
@@ -45,7 +45,7 @@ def desk(application: QApplication, robot: Robot) -> Desk:
     return Desk(robot)
 
 
-def test_there_is_a_slider_for_each_joint_that_is_moved_by_hand(desk: Desk) -> None:
+def test_each_independent_joint_with_a_range_has_a_slider(desk: Desk) -> None:
     sliders = {slider.objectName() for slider in desk.window.findChildren(QSlider)}
     assert sliders == {f"{name} slider" for name in ("lift", "turn", "wheel", "finger")}
 
@@ -59,13 +59,13 @@ def test_a_slider_moves_its_joint_between_the_limits(desk: Desk) -> None:
     assert desk.values.positions()["lift"] == pytest.approx(0.2)
 
 
-def test_a_number_may_be_typed(desk: Desk) -> None:
+def test_a_typed_number_moves_the_joint(desk: Desk) -> None:
     desk.number("wheel").setValue(-1.234)
     assert desk.values.positions()["wheel"] == -1.234
     assert desk.slider("wheel").value() == round((3.14159265 - 1.234) / 6.2831853 * TICKS)
 
 
-def test_to_show_a_position_does_not_round_it(desk: Desk) -> None:
+def test_displaying_a_position_does_not_round_it(desk: Desk) -> None:
     assert desk.values.positions()["turn"] == 0.12345
     desk.values.receive(["wheel"], [7.654321], [], [])
     desk.window.show_values()
@@ -83,7 +83,7 @@ def test_the_buttons_randomise_and_centre(desk: Desk) -> None:
     assert desk.values.positions() == before and desk.number("turn").value() == pytest.approx(0.12345, abs=1e-3)
 
 
-def test_the_number_of_rows_is_changed(application: QApplication, robot: Robot) -> None:
+def test_the_joints_per_column_can_be_changed(application: QApplication, robot: Robot) -> None:
     desk = Desk(robot, rows=2)
     desk.window.show()
     rows = desk.find(QSpinBox, "rows")

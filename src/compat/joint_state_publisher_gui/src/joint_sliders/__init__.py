@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A window with a slider for each joint of a robot, and the joint states it publishes."""
+"""Publisher of joint states, with an optional window that has a slider per independent joint."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Positions, velocities and efforts of all joints: set by hand or by a source, read for publishing."""
+"""Positions, velocities and efforts of all joints, set by the window or a source topic and read by the publisher."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from joint_sliders.slider_joints import SliderJoints
 
 @dataclass(frozen=True, slots=True)
 class JointArrays:
-    """What a joint state message holds; an empty array where nothing is known of any joint.
+    """Arrays of a JointState message; an array without known values is empty.
 
     Attributes:
-        names: All joints that move.
-        positions: [rad or m].
-        velocities: [rad/s or m/s].
-        efforts: [N m or N].
+        names: Names of all movable joints.
+        positions: Joint positions [rad or m].
+        velocities: Joint velocities [rad/s or m/s].
+        efforts: Joint efforts [Nm or N].
     """
 
     names: tuple[str, ...]
@@ -29,13 +29,14 @@ class JointArrays:
 
 
 class JointValues:
-    """The state of all joints; it may be used from several threads.
+    """Thread-safe state of all joints.
 
     Args:
-        joints: The joints.
-        positions: Whether the positions are known from the start; if not, once a joint is moved or a source sends some.
-        velocities: Whether the velocities are 0 at the start; if not, they are unknown until a source sends some.
-        efforts: The same for the efforts.
+        joints: Independent joints and mimic joints.
+        positions: Whether the initial positions are published. Otherwise positions are unknown until a joint is moved
+            or a source sends positions.
+        velocities: Whether the initial velocities are 0. Otherwise they are unknown until a source sends velocities.
+        efforts: Whether the initial efforts are 0. Otherwise they are unknown until a source sends efforts.
     """
 
     def __init__(
@@ -50,15 +51,15 @@ class JointValues:
         self._efforts = dict.fromkeys(joints.free, 0.0) if efforts else {}
 
     def positions(self) -> dict[str, float]:
-        """Returns the positions of the joints that are moved by hand [rad or m]."""
+        """Returns the positions of the independent joints [rad or m]."""
         with self._lock:
             return dict(self._positions)
 
     def set_position(self, name: str, position: float) -> None:
-        """Moves a joint [rad or m], at most to its limits.
+        """Sets the position of an independent joint [rad or m], clamped to the joint limits.
 
         Raises:
-            KeyError: No joint of this name is moved by hand.
+            KeyError: The joint is unknown or a mimic joint.
         """
         joint = self._joints.free[name]
         with self._lock:
@@ -66,7 +67,7 @@ class JointValues:
             self._positions_known = True
 
     def centre(self) -> None:
-        """Moves all joints to their zeros."""
+        """Moves all joints to their zero positions."""
         with self._lock:
             self._positions = {name: joint.zero for name, joint in self._joints.free.items()}
             self._positions_known = True
@@ -79,7 +80,7 @@ class JointValues:
             self._positions_known = True
 
     def sweep(self, step: float) -> None:
-        """Moves all joints on by a step [rad or m]: back and forth, and continuous ones round."""
+        """Moves all joints by a step [rad or m]; a joint with limits reverses at a limit."""
         with self._lock:
             self._positions_known = True
             for name, joint in self._joints.free.items():
@@ -94,13 +95,13 @@ class JointValues:
     def receive(
         self, names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], efforts: Sequence[float]
     ) -> None:
-        """Takes the values that a source has of joints that are moved by hand, as they are; others are passed over.
+        """Adopts the values of independent joints from a source without clamping; ignores all other joints.
 
         Args:
-            names: Joints.
-            positions: Of these joints [rad or m], or nothing.
-            velocities: [rad/s or m/s], or nothing.
-            efforts: [N m or N], or nothing.
+            names: Joint names.
+            positions: Positions of these joints [rad or m]; may be empty.
+            velocities: Velocities of these joints [rad/s or m/s]; may be empty.
+            efforts: Efforts of these joints [Nm or N]; may be empty.
         """
         with self._lock:
             self._positions_known = self._positions_known or len(positions) > 0
@@ -114,16 +115,18 @@ class JointValues:
                 )
 
     def arrays(self) -> JointArrays:
-        """Returns the values of all joints; those that follow others are computed."""
+        """Returns the values of all joints; values of mimic joints are computed from their leaders."""
         with self._lock:
             return JointArrays(
                 self._joints.names,
-                self._of_all(self._positions, with_offset=True) if self._positions_known else (),
-                self._of_all(self._velocities),
-                self._of_all(self._efforts, scaled=False),
+                self._with_mimics(self._positions, with_offset=True) if self._positions_known else (),
+                self._with_mimics(self._velocities),
+                self._with_mimics(self._efforts, scaled=False),
             )
 
-    def _of_all(self, values: Mapping[str, float], with_offset: bool = False, scaled: bool = True) -> tuple[float, ...]:
+    def _with_mimics(
+        self, values: Mapping[str, float], with_offset: bool = False, scaled: bool = True
+    ) -> tuple[float, ...]:
         if not values:
             return ()
         result = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of the node, checked: all faults at once."""
+"""Reads and checks the parameters of the node; an error lists all faults."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ from modular_framework_urdf.mimics import Mimic
 
 @dataclass(frozen=True, slots=True)
 class NodeParameters:
-    """What the node reads.
+    """Parameters of the node.
 
     Attributes:
-        settings: How the description is read.
-        source_list: Topics whose joint states are taken over.
-        rate: Joint states published in a second [1/s].
-        delta: How far all joints move between two of them [rad or m]; 0: not.
-        num_rows: Joints below each other in the window; 0: all.
-        default_positions, default_velocities, default_efforts: Whether these are published from the start.
+        settings: Settings for reading the robot description.
+        source_list: Topics whose joint states the node adopts.
+        rate: Publishing rate [1/s].
+        delta: Step of all joints per message [rad or m]; 0 for no motion.
+        num_rows: Joints per column of the window; 0 for a single column.
+        default_positions: Whether positions are published from the start.
+        default_velocities: Whether velocities are published from the start.
+        default_efforts: Whether efforts are published from the start.
     """
 
     settings: SliderSettings
@@ -41,7 +43,7 @@ def read_parameters(read: ParameterReader) -> NodeParameters:
     """Returns the node's parameters.
 
     Raises:
-        ParameterError: Values are not allowed; names all of them.
+        ParameterError: A value is invalid; the message lists all invalid values.
     """
     mimic_tags, smallest_limits, zeros, dependent, sources, *others = read.values(
         "~use_mimic_tags",
@@ -63,7 +65,7 @@ def read_parameters(read: ParameterReader) -> NodeParameters:
 
 def _mimic(name: str, entry: Mapping[str, Any]) -> Mimic:
     if entry.keys() - {"parent", "factor", "offset"} or not isinstance(entry.get("parent"), str):
-        allowed = "a mapping with parent and, if wanted, factor and offset"
+        allowed = "a mapping with parent and, optionally, factor and offset"
         raise ParameterError(f"parameter '{name}' is {entry!r}; allowed: {allowed}")
     factor, offset = entry.get("factor", 1), entry.get("offset", 0)
     if not (_is_number(factor) and _is_number(offset)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Node joint_state_publisher: publishes joint states, with the window where that is asked for."""
+"""Node joint_state_publisher: publishes joint states, and opens the window if `~use_gui` is true."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from joint_sliders.ros_publisher import declared_parameters, joint_state_publish
 
 
 def main() -> int:
-    """Publishes without a window, or with one where the parameter use_gui is true; returns the exit code."""
+    """Runs the node and returns the exit code; the parameter `~use_gui` opens the window."""
     rospy.init_node("joint_state_publisher")
     if declared_parameters().value("~use_gui"):
-        from joint_sliders import ros_window  # a computer without a screen needs no library of windows
+        from joint_sliders import ros_window  # without the window, the node does not need Qt
 
         return ros_window.run()
     publisher = joint_state_publisher()

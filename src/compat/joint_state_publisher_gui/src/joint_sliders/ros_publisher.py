@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the joint states of a robot: parameters and topics, without a window."""
+"""Publishes the joint states of a robot; independent of the window."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ OUTPUT = "joint_states"
 
 
 class JointStatePublisher:
-    """Publishes joint states at a rate, and takes over those of other topics.
+    """Publishes joint states at a fixed rate, and adopts joint states from source topics.
 
     Parameters, private or in the node's namespace: see `parameters/joint_state_publisher_gui.yaml`.
     Subscribers: the topics of source_list (sensor_msgs/JointState).
     Publishers: joint_states (sensor_msgs/JointState).
 
     Args:
-        joints: The robot's joints.
-        parameters: The node's parameters.
+        joints: Joints of the robot.
+        parameters: Parameters of the node.
 
     Attributes:
-        joints: As given.
-        parameters: As given.
-        values: What is published.
+        joints: Joints of the robot.
+        parameters: Parameters of the node.
+        values: Published joint values.
     """
 
     def __init__(self, joints: SliderJoints, parameters: NodeParameters) -> None:
@@ -44,10 +44,10 @@ class JointStatePublisher:
         self.values = JointValues(joints, *defaults)
 
     def start(self, on_change: Callable[[], None]) -> None:
-        """Begins to publish and to receive, in threads.
+        """Starts the publishing thread and the subscribers.
 
         Args:
-            on_change: Called, from any thread, when the values have changed.
+            on_change: Function called after each change of the values, from any thread.
         """
         self._publisher = rospy.Publisher(OUTPUT, JointState, queue_size=5)
         self._on_change = on_change
@@ -57,7 +57,7 @@ class JointStatePublisher:
 
     def _receive(self, message: JointState) -> None:
         if message._connection_header["callerid"] == rospy.get_name():
-            return  # source_list may name the topic that this node publishes
+            return  # source_list may contain the topic that this node publishes
         self.values.receive(message.name, message.position, message.velocity, message.effort)
         self._on_change()
 
@@ -87,7 +87,7 @@ class JointStatePublisher:
 
 
 def joint_state_publisher() -> JointStatePublisher | None:
-    """Returns the publisher that the parameters ask for; logs what is wrong with them and returns None if it is."""
+    """Returns the publisher configured by the parameters; logs invalid parameters and returns None."""
     declared = declared_parameters()
     try:
         parameters = read_parameters(declared)
@@ -102,7 +102,7 @@ def joint_state_publisher() -> JointStatePublisher | None:
 
 
 def declared_parameters() -> ParameterReader:
-    """Returns the parameters of the node: private, or in its namespace, or the defaults."""
+    """Returns a reader of the node's parameters: private names first, then the node's namespace, then the defaults."""
     return ParameterReader(
         existing_declaration("joint_state_publisher_gui", "joint_state_publisher_gui"),
         lambda name: rospy.get_param(name, rospy.get_param(name[1:], None)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Node joint_state_publisher_gui: the window's event loop, beside the publisher's threads."""
+"""Node joint_state_publisher_gui: runs the window's event loop in the main thread."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from joint_sliders.ros_publisher import joint_state_publisher
 from joint_sliders.window import SliderWindow
 
 SIGNAL_PERIOD_MS = 200
-"""How often Qt's loop lets Python see a signal."""
+"""Period at which Qt's event loop runs Python's signal handlers."""
 
 
 def main() -> int:
-    """Starts the node and shows its window until it is closed; returns the exit code."""
+    """Starts the node, shows the window until it is closed, and returns the exit code."""
     rospy.init_node("joint_state_publisher_gui", disable_signals=True)
     return run()
 
 
 def run() -> int:
-    """Shows the window until it is closed or the node, which is started, is shut down; returns the exit code."""
+    """Shows the window until it is closed or the node shuts down; returns the exit code. Call init_node before."""
     publisher = joint_state_publisher()
     if publisher is None:
         return 1
@@ -40,7 +40,7 @@ def run() -> int:
 
 
 def _end_with_node(application: QApplication) -> None:
-    """Ends Qt's loop at an interrupt and when the node is shut down."""
+    """Quits Qt's event loop on SIGINT, on SIGTERM and on shutdown of the node."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: application.quit())
     timer = QTimer(application)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which joints of a robot are moved by hand, within which limits, and which ones follow them."""
+"""Selects the independent joints of a robot with their limits, and the mimic joints."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import Joint, Robot
 
 DECIMALS = 3
-"""Decimals of a position that is shown."""
+"""Decimals of displayed positions."""
 
 
 @dataclass(frozen=True, slots=True)
 class SliderSettings:
-    """Parameters of the public joint_state_publisher that say how a description is read.
+    """Parameters of the public joint_state_publisher for reading a robot description.
 
     Attributes:
-        use_mimic_tags: Whether <mimic> joints follow; if not, they are moved by hand.
-        use_smallest_joint_limits: Whether soft limits of a <safety_controller> narrow the range.
-        zeros: Positions at the start and after centring, by joint [rad or m].
-        dependent_joints: More joints that follow another one, by joint.
+        use_mimic_tags: Whether <mimic> joints follow their leaders; otherwise they are independent.
+        use_smallest_joint_limits: Whether the soft limits of a <safety_controller> narrow the range.
+        zeros: Zero positions, by joint name [rad or m].
+        dependent_joints: Additional mimic joints, by joint name.
     """
 
     use_mimic_tags: bool = True
@@ -33,15 +33,15 @@ class SliderSettings:
 
 @dataclass(frozen=True, slots=True)
 class SliderJoint:
-    """A joint that is moved by hand.
+    """Independent joint.
 
     Attributes:
-        name: Of the joint.
-        lower: Least position [rad or m].
-        upper: Largest position [rad or m].
-        zero: Position at the start and after centring [rad or m].
-        unit: "rad" or "m".
-        continuous: Whether positions a whole turn apart are the same.
+        name: Joint name.
+        lower: Minimum position [rad or m].
+        upper: Maximum position [rad or m].
+        zero: Position at startup and after `Center` [rad or m].
+        unit: Unit of positions, "rad" or "m".
+        continuous: Whether the joint is continuous, so that positions 2 pi apart are equal.
     """
 
     name: str
@@ -53,17 +53,17 @@ class SliderJoint:
 
     @property
     def has_range(self) -> bool:
-        """Whether there is anything to choose."""
+        """Whether the joint can move."""
         return self.upper > self.lower
 
     @property
     def range_text(self) -> str:
-        """The limits, for a user."""
+        """Text of the limits for the tooltip."""
         limits = f"{self.lower:.{DECIMALS}f} to {self.upper:.{DECIMALS}f} {self.unit}"
         return f"{limits}, continuous" if self.continuous else limits
 
     def shown(self, position: float) -> float:
-        """Returns the position within the limits that is nearest; of a continuous joint, the same one within a turn."""
+        """Returns the position clamped to the limits; a position of a continuous joint is wrapped to -pi..pi."""
         if self.continuous and not self.lower <= position <= self.upper:
             position = math.remainder(position, math.tau)
         return min(max(position, self.lower), self.upper)
@@ -71,13 +71,13 @@ class SliderJoint:
 
 @dataclass(frozen=True, slots=True)
 class SliderJoints:
-    """The joints of a robot as the window needs them.
+    """Independent joints and mimic joints of a robot.
 
     Attributes:
-        names: All joints that move, in the order of the description.
-        free: Those that are moved by hand, by name.
-        following: What each of the others follows.
-        warnings: What of the settings or the description is not used, and why.
+        names: Names of all movable joints, in the order of the description.
+        free: Independent joints, by name.
+        following: Relations of the mimic joints to their leaders, by name.
+        warnings: Ignored parts of the settings or the description, with the reason.
     """
 
     names: tuple[str, ...]
@@ -90,11 +90,11 @@ def slider_joints(robot: Robot, settings: SliderSettings) -> SliderJoints:
     """Returns the joints of a robot.
 
     Args:
-        robot: The description.
-        settings: How it is read.
+        robot: Robot description.
+        settings: Settings for reading the description.
 
     Raises:
-        ValueError: A range is empty, or a joint follows itself or one that does not move.
+        ValueError: A range is empty, or a joint mimics itself or a joint that is not movable.
     """
     movable = {joint.name: joint for joint in robot.movable_joints()}
     warnings = [
@@ -127,7 +127,7 @@ def _limits(joint: Joint, smallest: bool, warnings: list[str]) -> tuple[float, f
     if joint.kind == "continuous":
         lower, upper = -math.pi, math.pi
     elif joint.limit is None:
-        warnings.append(f"robot_description:{joint.line}: joint '{joint.name}' has no <limit>: it stays at 0")
+        warnings.append(f"robot_description:{joint.line}: joint '{joint.name}' has no <limit> and stays at 0")
         return 0.0, 0.0
     else:
         lower, upper = joint.limit.lower, joint.limit.upper
@@ -137,6 +137,6 @@ def _limits(joint: Joint, smallest: bool, warnings: list[str]) -> tuple[float, f
     if not (lower <= upper and math.isfinite(lower) and math.isfinite(upper)):
         raise ValueError(
             f"robot_description:{joint.line}: joint '{joint.name}' has the range [{lower}, {upper}]; allowed: a finite "
-            "lower limit that is not above the upper one; correct <limit> or <safety_controller>"
+            "lower limit that is not above the upper limit; correct <limit> or <safety_controller>"
         )
     return lower, upper

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The window: a slider and a number for each joint that is moved by hand, and buttons for all of them."""
+"""Window with a slider and a spin box per independent joint, and buttons that move all joints."""
 
 from __future__ import annotations
 
@@ -25,52 +25,52 @@ from joint_sliders.joint_values import JointValues
 from joint_sliders.slider_joints import DECIMALS, SliderJoint, SliderJoints
 
 TICKS = 10000
-"""Steps of a slider over its joint's range; numbers may be between two steps."""
+"""Slider steps over the range of a joint; typed positions are not rounded to a step."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointRow:
-    """The widgets of a joint.
+    """Widgets of a joint.
 
     Attributes:
-        joint: The joint.
-        widget: Holds the others.
-        number: The position, which may be typed.
-        slider: The position as a share of the range.
+        joint: Displayed joint.
+        widget: Parent widget of the row.
+        spin_box: Spin box with the position.
+        slider: Slider with the position as a fraction of the range.
     """
 
     joint: SliderJoint
     widget: QWidget
-    number: QDoubleSpinBox
+    spin_box: QDoubleSpinBox
     slider: QSlider
 
     def position(self, tick: int) -> float:
-        """Returns the position [rad or m] of a step of the slider."""
+        """Returns the position [rad or m] at a slider step."""
         return self.joint.lower + (self.joint.upper - self.joint.lower) * tick / TICKS
 
     def show(self, position: float) -> None:
-        """Shows a position [rad or m] without taking it for one that the user chose."""
+        """Displays a position [rad or m] without emitting `valueChanged`."""
         position = self.joint.shown(position)
-        share = (position - self.joint.lower) / (self.joint.upper - self.joint.lower)
-        for widget, value in ((self.number, position), (self.slider, round(share * TICKS))):
+        fraction = (position - self.joint.lower) / (self.joint.upper - self.joint.lower)
+        for widget, value in ((self.spin_box, position), (self.slider, round(fraction * TICKS))):
             widget.blockSignals(True)
             widget.setValue(value)
             widget.blockSignals(False)
 
 
 class SliderWindow(QWidget):
-    """The window.
+    """Main window of joint_state_publisher_gui.
 
     Args:
-        title: Of the window.
-        joints: The joints; those without a range have no slider.
-        values: Where positions are read and set.
-        rows: How many joints stand below each other; 0: all.
-        generator: Of the random positions.
+        title: Window title.
+        joints: Joints of the robot; joints that cannot move have no slider.
+        values: Joint values shared with the publisher.
+        rows: Joints per column; 0 for a single column.
+        generator: Random number generator of the button `Randomize`.
     """
 
     values_changed = Signal()
-    """To be emitted, from any thread, when somebody else has set values."""
+    """Emit this signal, from any thread, after another component has changed the values."""
 
     def __init__(
         self,
@@ -91,30 +91,30 @@ class SliderWindow(QWidget):
         self.show_values()
 
     def show_values(self) -> None:
-        """Shows the positions as they are now."""
+        """Displays the current positions."""
         positions = self._values.positions()
         for row in self._rows:
             row.show(positions[row.joint.name])
 
     def _make_row(self, joint: SliderJoint, joints: SliderJoints) -> JointRow:
-        widget, number, slider = QWidget(), QDoubleSpinBox(), QSlider(Qt.Horizontal)
-        number.setObjectName(f"{joint.name} number")
-        number.setDecimals(DECIMALS)
-        number.setRange(joint.lower, joint.upper)
-        number.setSingleStep((joint.upper - joint.lower) / 100)
-        number.setSuffix(f" {joint.unit}")
-        number.setKeyboardTracking(False)  # a number counts when it is typed to its end
+        widget, spin_box, slider = QWidget(), QDoubleSpinBox(), QSlider(Qt.Horizontal)
+        spin_box.setObjectName(f"{joint.name} number")
+        spin_box.setDecimals(DECIMALS)
+        spin_box.setRange(joint.lower, joint.upper)
+        spin_box.setSingleStep((joint.upper - joint.lower) / 100)
+        spin_box.setSuffix(f" {joint.unit}")
+        spin_box.setKeyboardTracking(False)  # report a typed value on Enter, not on every key
         slider.setObjectName(f"{joint.name} slider")
         slider.setRange(0, TICKS)
         slider.setMinimumWidth(200)
-        row = JointRow(joint, widget, number, slider)
-        number.valueChanged.connect(lambda position: self._move(row, position))
+        row = JointRow(joint, widget, spin_box, slider)
+        spin_box.valueChanged.connect(lambda position: self._move(row, position))
         slider.valueChanged.connect(lambda tick: self._move(row, row.position(tick)))
-        followers = [name for name, mimic in joints.following.items() if mimic.leader == joint.name]
+        mimic_joints = [name for name, mimic in joints.following.items() if mimic.leader == joint.name]
         widget.setToolTip(
-            f"{joint.name}: {joint.range_text}" + (f"; {', '.join(followers)} follow it" if followers else "")
+            f"{joint.name}: {joint.range_text}" + (f"; mimic joints: {', '.join(mimic_joints)}" if mimic_joints else "")
         )
-        _arrange(row)
+        _lay_out(row)
         return row
 
     def _move(self, row: JointRow, position: float) -> None:
@@ -131,14 +131,14 @@ class SliderWindow(QWidget):
         layout.addWidget(area)
         layout.addWidget(_button("Randomize", self._randomise))
         layout.addWidget(_button("Center", self._centre))
-        count = QSpinBox()
-        count.setObjectName("rows")
-        count.setPrefix("joints in a column: ")
-        count.setRange(1, max(1, len(self._rows)))
-        count.valueChanged.connect(self._place_rows)
-        count.setValue(rows)
-        layout.addWidget(count)
-        self._place_rows(count.value())
+        rows_box = QSpinBox()
+        rows_box.setObjectName("rows")
+        rows_box.setPrefix("joints per column: ")
+        rows_box.setRange(1, max(1, len(self._rows)))
+        rows_box.valueChanged.connect(self._place_rows)
+        rows_box.setValue(rows)
+        layout.addWidget(rows_box)
+        self._place_rows(rows_box.value())
         area.setMinimumHeight(min(content.sizeHint().height() + 4, 700))
 
     def _place_rows(self, rows: int) -> None:
@@ -154,19 +154,19 @@ class SliderWindow(QWidget):
         self.show_values()
 
 
-def _arrange(row: JointRow) -> None:
+def _lay_out(row: JointRow) -> None:
     name = QLabel(f"<b>{row.joint.name}</b>")
-    top, all_of_it = QHBoxLayout(), QVBoxLayout(row.widget)
+    top, row_layout = QHBoxLayout(), QVBoxLayout(row.widget)
     top.addWidget(name)
     top.addStretch()
-    top.addWidget(row.number)
+    top.addWidget(row.spin_box)
     bottom = QHBoxLayout()
     bottom.addWidget(QLabel(f"{row.joint.lower:.2f}"))
     bottom.addWidget(row.slider)
     bottom.addWidget(QLabel(f"{row.joint.upper:.2f}"))
-    all_of_it.addLayout(top)
-    all_of_it.addLayout(bottom)
-    all_of_it.setContentsMargins(4, 2, 4, 2)
+    row_layout.addLayout(top)
+    row_layout.addLayout(bottom)
+    row_layout.setContentsMargins(4, 2, 4, 2)
 
 
 def _button(text: str, action: Callable[[], None]) -> QPushButton:
