@@ -30,7 +30,7 @@ def test_the_axes_turn_with_the_frame(approach: tuple[float, float], yaw: float)
     assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("fingers", "fault"), [(FINGERS[:1], "1 outermost"), (FINGERS[[0, 0]], "never apart")])
+@pytest.mark.parametrize(("fingers", "fault"), [(FINGERS[:1], "1 outermost"), (FINGERS[[0, 0]], "no distance")])
 def test_a_hand_without_two_fingers_is_refused(fingers: np.ndarray, fault: str) -> None:
     with pytest.raises(ValueError, match=fault):
         hand_axes(fingers, PALM)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What grasp generators share: objects of the scene, geometry of the hand, the node that stores what a method finds."""
+"""Common parts of grasp generators: scene objects, hand geometry, and the node that stores the grasps of a method."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A pair of contacts at which two fingers can hold an object."""
+"""Pairs of contacts at which two fingers can hold an object."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ContactPair:
-    """Two contacts on opposite sides.
+    """Two contacts on opposite sides of an object.
 
     Attributes:
-        first: (3,) where the line between them enters the object [m].
-        second: (3,) where it leaves the object [m].
-        alignment: The lesser cosine between that line and the inward normal of the first, or the outward normal of the
-            second contact.
+        first: Contact at which the line through both contacts enters the object, shape (3,) [m].
+        second: Contact at which this line leaves the object, shape (3,) [m].
+        alignment: Smaller cosine between this line and a surface normal: the inward normal at the first contact, or
+            the outward normal at the second.
     """
 
     first: Array
@@ -35,28 +35,30 @@ class ContactPair:
 
     @property
     def axis(self) -> Array:
-        """Unit vector (3,) from the first contact to the second: the closing axis."""
+        """Closing axis: unit vector from the first to the second contact, shape (3,)."""
         return (self.second - self.first) / self.width
 
     @property
     def middle(self) -> Array:
-        """Half way between the contacts (3,) [m]."""
+        """Midpoint of the contacts, shape (3,) [m]."""
         return (self.first + self.second) / 2
 
     def distance_from(self, point: Array) -> float:
-        """Returns the distance of the closing axis from a point (3,) [m]."""
+        """Returns the distance between the closing axis and a point of shape (3,) [m]."""
         offset = point - self.middle
         return float(np.linalg.norm(offset - self.axis * (offset @ self.axis)))
 
 
 @dataclass(frozen=True, slots=True)
 class PairRules:
-    """Which contacts make a pair, and which pairs are nearly the same.
+    """Limits for valid pairs and for duplicate pairs.
+
+    Pairs are duplicates if both their midpoints and their closing axes are closer than the spacings.
 
     Attributes:
-        friction: Coefficient of friction between pad and object; its cone has the half angle atan(friction).
-        spacing_m: Pairs whose middles are nearer than this ...
-        spacing_rad: ... and whose axes differ by less than this [rad] count as one, of which the best is kept.
+        friction: Friction coefficient between pad and object; the friction cone has the half angle atan(friction).
+        spacing_m: Minimum distance between the midpoints of distinct pairs [m].
+        spacing_rad: Minimum angle between the closing axes of distinct pairs [rad].
     """
 
     friction: float = 0.3
@@ -70,18 +72,18 @@ class PairRules:
 
 
 def distinct_pairs(pairs: Iterable[ContactPair], rules: PairRules) -> list[ContactPair]:
-    """Keeps the first of all pairs that are nearly the same.
+    """Removes duplicate pairs.
 
     Args:
-        pairs: The pairs, best first.
-        rules: Which are nearly the same.
+        pairs: Pairs, best first; the first of several duplicates is kept.
+        rules: Spacings of distinct pairs.
     """
     kept: list[ContactPair] = []
     middles, axes = np.zeros((0, 3)), np.zeros((0, 3))
-    least = math.cos(rules.spacing_rad)
+    min_cosine = math.cos(rules.spacing_rad)
     for pair in pairs:
         near = np.linalg.norm(middles - pair.middle, axis=1) < rules.spacing_m
-        if not (near & (np.abs(axes @ pair.axis) > least)).any():
+        if not (near & (np.abs(axes @ pair.axis) > min_cosine)).any():
             kept.append(pair)
             middles, axes = np.vstack([middles, pair.middle]), np.vstack([axes, pair.axis])
     return kept

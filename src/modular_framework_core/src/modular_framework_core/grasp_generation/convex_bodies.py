@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the collision shapes of a URDF into convex bodies, and computes how far each reaches in a direction."""
+"""Converts the collision shapes of a URDF to convex bodies, and computes their extent along z."""
 
 from __future__ import annotations
 
@@ -21,59 +21,60 @@ Array = npt.NDArray[np.float64]
 ROUND_SIDES = 24
 PARALLEL = 1e-9
 MESH_TOLERANCE_M = 1.0e-3
-"""How far the body around a mesh may reach beyond the mesh; rounded meshes have thousands of faces, which take time."""
+"""Maximum distance of the convex body from the hull of its mesh; limits the number of faces of rounded meshes."""
 
 
 class ShapeError(ValueError):
-    """A collision shape cannot be used; the text says why."""
+    """A collision shape cannot be used; the text is the reason, as a predicate."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConvexBody:
-    """A convex body.
+    """Convex body.
 
     Attributes:
-        corners: (k, 3) its corners [m].
-        planes: (m, 4) outward unit normal and offset of each face; inside, normal . point + offset <= 0.
+        corners: Corners, shape (k, 3) [m].
+        planes: Outward unit normal and offset of each face, shape (m, 4); inside, normal . point + offset <= 0.
     """
 
     corners: Array
     planes: Array
 
     def moved(self, transform: Array) -> ConvexBody:
-        """Returns the body after a transform (4, 4)."""
+        """Returns the body after a transform of shape (4, 4)."""
         normals = self.planes[:, :3] @ transform[:3, :3].T
         offsets = self.planes[:, 3] - normals @ transform[:3, 3]
         return ConvexBody(self.corners @ transform[:3, :3].T + transform[:3, 3], np.column_stack([normals, offsets]))
 
 
 def convex_hull(points: Array, tolerance_m: float = 0.0) -> ConvexBody:
-    """Computes the convex hull of points (n, 3) [m].
+    """Computes the convex hull of points.
 
     Args:
-        points: At least four, not in one plane.
-        tolerance_m: How far the faces may be outside of the points, so that there are fewer of them.
+        points: At least four points that are not in one plane, shape (n, 3) [m].
+        tolerance_m: Maximum distance of the faces from the exact hull [m]; a larger tolerance gives fewer faces.
 
     Raises:
-        ShapeError: They lie in one plane.
+        ShapeError: All points lie in one plane.
     """
     try:
         hull = ConvexHull(points, qhull_options=f"Qt W{tolerance_m}" if tolerance_m else "Qt")
     except QhullError as error:
         raise ShapeError(f"has no volume: {len(points)} points, all in one plane; a solid is needed") from error
     planes = np.unique(np.round(hull.equations, 12), axis=0)
-    if tolerance_m:  # the points that Qhull left out are still outside
+    if tolerance_m:  # the points that Qhull omitted are outside its faces
         planes[:, 3] = -(planes[:, :3] @ points.T).max(axis=1)
     return ConvexBody(points[hull.vertices], planes)
 
 
 def collision_body(collision: PlacedShapes) -> ConvexBody:
-    """Makes the convex body of a URDF collision element, in the frame of the shape.
+    """Returns the convex body of a URDF collision element in the frame of the shape.
 
-    Round shapes become prisms of 24 sides around them. A mesh becomes a body at most 1 mm around its convex hull.
+    A cylinder or sphere is enclosed by a polyhedron with 24 sides around. A mesh is enclosed by its convex hull with a
+    tolerance of 1 mm.
 
     Raises:
-        ShapeError: The element has no shape that is known, or its mesh cannot be read.
+        ShapeError: The element has no known shape, or its mesh cannot be read.
     """
     match collision.shapes[0] if collision.shapes else UnknownShape("missing"):
         case Box(size):
@@ -88,19 +89,19 @@ def collision_body(collision: PlacedShapes) -> ConvexBody:
         case MeshFile() as mesh:
             return convex_hull(_mesh_vertices(mesh), MESH_TOLERANCE_M)
         case other:
-            raise ShapeError(f"is {other.tag!r}; allowed are box, cylinder, sphere and mesh")
+            raise ShapeError(f"is {other.tag!r}; allowed: box, cylinder, sphere, mesh")
 
 
 def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
-    """Computes the greatest z of convex bodies in columns along z.
+    """Computes the maximum z of convex bodies on lines parallel to z.
 
     Args:
-        planes: (n, m, 4) faces of n bodies with as many faces each: see ConvexBody.
-        columns: (k, 2) x and y of the columns [m].
-        margin: Distance by which each face is moved outwards first [m].
+        planes: Faces of n bodies with m faces each, shape (n, m, 4); see ConvexBody.
+        columns: x and y of the lines, shape (k, 2) [m].
+        margin: Distance by which each face is moved outwards before the computation [m].
 
     Returns:
-        (n, k) greatest z [m]; -inf where a column misses the body.
+        Maximum z, shape (n, k) [m]; -inf if a line misses the body.
     """
     level = planes[:, :, :2] @ columns.T + planes[:, :, 3:] - margin  # (n, m, k); inside: level + normal_z z <= 0
     slope = planes[:, :, 2:3]
@@ -114,7 +115,7 @@ def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
 def _positive(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
     if not all(0.0 < value < math.inf for value in values):
         text = " ".join(f"{value:g}" for value in values)
-        raise ShapeError(f"has the {name} '{text}', allowed are numbers of more than 0")
+        raise ShapeError(f"has the {name} '{text}'; allowed: numbers above 0")
     return values
 
 
@@ -131,9 +132,10 @@ def _around_cylinder(radius: float, length: float) -> Array:
 def _around_sphere(radius: float) -> Array:
     rings = np.arange(ROUND_SIDES // 2 + 1) * 2 * math.pi / ROUND_SIDES - math.pi / 2
     angles = np.arange(ROUND_SIDES) * 2 * math.pi / ROUND_SIDES
-    tilt, turn = (grid.ravel() for grid in np.meshgrid(rings, angles))
-    outside = radius / math.cos(math.pi / ROUND_SIDES) ** 2
-    return outside * np.column_stack([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
+    latitude, longitude = (grid.ravel() for grid in np.meshgrid(rings, angles))
+    outer_radius = radius / math.cos(math.pi / ROUND_SIDES) ** 2
+    directions = [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)]
+    return outer_radius * np.column_stack(directions)
 
 
 def _mesh_vertices(mesh: MeshFile) -> Array:

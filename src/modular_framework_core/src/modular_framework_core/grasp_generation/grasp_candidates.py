@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a grasp method is asked, and what it answers."""
+"""Interface of grasp methods: query, grasp candidates, and the methods to implement."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class GraspQuery:
-    """An object to grasp, where it stands.
+    """Object to grasp, with its surroundings.
 
     Attributes:
-        target: The object.
-        obstacles: The other objects of the scene.
-        support_z: Height of what the target stands on [m].
+        target: Object to grasp.
+        obstacles: All other objects of the scene.
+        support_z: Height of the surface that supports the target [m].
         gripper: Geometry of the hand.
-        seed: Seed of every random choice.
+        seed: Seed of all random numbers.
     """
 
     target: SceneObject
@@ -36,15 +36,15 @@ class GraspQuery:
 
 @dataclass(frozen=True, slots=True)
 class GraspCandidate:
-    """One way to grasp an object: the hand advances along its approach, closes, and is lifted.
+    """Grasp of an object: the hand moves along its approach direction, closes, and lifts.
 
     Attributes:
-        position: (3,) the grasp frame in the planning frame [m].
-        hand_axes: (3, 3) axes of the hand in the planning frame, as columns: closing, across and approach.
-        pregrasp_joint: Gripper joint position with which the hand advances [rad or m].
-        approach_distance_m: How far behind the grasp the hand begins to advance [m].
-        lift_distance_m: How high the hand is lifted [m].
-        quality: Rank in [0, 1]; more is better.
+        position: Position of the grasp frame in the planning frame, shape (3,) [m].
+        hand_axes: Axes of the hand in the planning frame, as columns: closing, across, approach; shape (3, 3).
+        pregrasp_joint: Gripper joint position during the approach [rad or m].
+        approach_distance_m: Length of the approach [m].
+        lift_distance_m: Height of the lift [m].
+        quality: Quality in [0, 1]; higher is better.
     """
 
     position: Array
@@ -56,73 +56,70 @@ class GraspCandidate:
 
     @property
     def pregrasp_position(self) -> Array:
-        """Where the grasp frame begins to advance, in the planning frame (3,) [m]."""
+        """Position of the grasp frame before the approach, in the planning frame, shape (3,) [m]."""
         return self.position - self.approach_distance_m * self.hand_axes[:, 2]
 
     @property
     def postgrasp_position(self) -> Array:
-        """Where the grasp frame is lifted to, in the planning frame (3,) [m]."""
+        """Position of the grasp frame after the lift, in the planning frame, shape (3,) [m]."""
         return self.position + np.array([0.0, 0.0, self.lift_distance_m])
 
 
 class NoCandidatesError(RuntimeError):
-    """A method finds no grasp of an object; the text says why, to follow "no part of it can be grasped ...:"."""
+    """A method finds no grasp of an object; the text is the cause, which follows "no part ... can be grasped ...: "."""
 
 
 class ReadNumber(Protocol):
-    """Reads a parameter of a method, which is a number."""
+    """Function that reads a numeric parameter of a method."""
 
     def __call__(self, name: str) -> float:
-        """Returns its value, or the default that is declared for it.
+        """Returns the value of the parameter, or its declared default.
 
         Args:
-            name: Parameter, with ~ in front as of a node's own.
+            name: Parameter name; private parameters begin with `~`.
 
         Raises:
-            Exception: It is not declared, or the value is not allowed; the kind depends on who reads.
+            Exception: The parameter is not declared or its value is invalid; the reader defines the exception type.
         """
 
 
 class GraspMethod(Protocol):
-    """Finds and ranks grasps; what one grasp generator does differently from another."""
+    """Algorithm that finds and ranks grasps; the only part that differs between grasp generators."""
 
     @property
     def manner(self) -> str:
-        """How it grasps, to complete "no part of this can be grasped ...": ``from above``."""
+        """Adverbial phrase such as ``from above`` that completes the message "no part of ... can be grasped"."""
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps of an object, best first; empty when it cannot be grasped in this manner.
+        """Returns the grasps of an object, best first; empty if the method finds no grasp.
 
         Raises:
-            NoCandidatesError: It cannot, and the method knows why.
+            NoCandidatesError: The method finds no grasp and knows the cause.
         """
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
-        """Ranks a grasp that the arm can reach.
+        """Returns the final quality of a reachable grasp in [0, 1]; higher is better.
 
         Args:
-            candidate: The grasp.
-            joint_travel: Farthest that a joint moves from pregrasp to grasp, or from grasp to lift [rad or m].
-
-        Returns:
-            Its final rank in [0, 1]; more is better.
+            candidate: Reachable grasp.
+            joint_travel: Largest motion of a joint between two consecutive poses of the grasp [rad or m].
         """
 
 
 @runtime_checkable
 class SeeingMethod(Protocol):
-    """What a grasp method offers besides that finds objects itself where the planning scene has none."""
+    """Additional interface of a grasp method that detects objects itself if the planning scene has none."""
 
     def connect(self) -> None:
-        """Connects to what it sees with; called once, by a node."""
+        """Connects to the sensors; the node calls this method once."""
 
     def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
-        """Returns the objects in the crop box.
+        """Returns the detected objects.
 
         Args:
-            crop: Where objects are looked for.
-            seed: Seed of every random choice.
+            crop: Search volume.
+            seed: Seed of all random numbers.
 
         Raises:
-            NoCandidatesError: There are none; the text says why.
+            NoCandidatesError: No object is detected; the text is the cause.
         """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes the opening of a two-finger gripper, and where its parts are, from the robot description.
+"""Computes opening and convex parts of a two-finger gripper per joint position, from the robot description.
 
-The pads are found by their motion, not by their names or their place in the tree of links: of all pairs of moving parts
-that face each other, those whose gap changes most over the stroke, and of these the pair nearest to the middle. A
-four-bar finger has parts nearer to the middle (the inner knuckle of a Robotiq 2F-85), but their gap hardly changes.
+The pads are identified by their motion, not by names or the kinematic tree. Of all pairs of moving parts that face each
+other, the pads are the innermost pair among those whose gap changes most over the stroke. The innermost parts alone are
+no criterion: in a four-bar finger they can be knuckles whose gap hardly changes (Robotiq 2F-85).
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from modular_framework_urdf.xml_text import XmlError
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200
-FULL_STROKE = 0.9  # fraction of the longest stroke from which on a pair of parts can be the pads
+FULL_STROKE = 0.9  # minimum stroke of the pads, as a fraction of the longest stroke of all pairs
 
 
 class GripperGeometryError(ValueError):
-    """The robot description does not describe a two-finger gripper; the text says what is missing."""
+    """The robot description does not describe a two-finger gripper; the text names the missing part."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandPart:
-    """A convex part of the hand in the frame of the hand, at every sampled position of the gripper's joint.
+    """Convex part of the hand in the hand frame, at every sampled position of the gripper joint.
 
     Attributes:
-        link: Link it belongs to.
-        corners: (n, k, 3) corners [m].
-        planes: (n, m, 4) outward unit normal and offset of each face; inside, normal . point + offset <= 0.
-        is_pad: Whether it is one of the two pads, which are to touch the object.
+        link: Link of the part.
+        corners: Corners, shape (n, k, 3) [m].
+        planes: Outward unit normal and offset of each face, shape (n, m, 4); inside, normal . point + offset <= 0.
+        is_pad: Whether the part is one of the two pads that touch the object.
     """
 
     link: str
@@ -52,27 +52,28 @@ class HandPart:
     is_pad: bool = False
 
     def turned(self, axes: Array) -> HandPart:
-        """Returns the part in a frame whose axes (3, 3) are given as columns."""
+        """Returns the part in a frame whose axes are the columns of a matrix of shape (3, 3)."""
         planes = np.concatenate([self.planes[:, :, :3] @ axes, self.planes[:, :, 3:]], axis=2)
         return HandPart(self.link, self.corners @ axes, planes, self.is_pad)
 
 
 @dataclass(frozen=True, slots=True)
 class GripperGeometry:
-    """A gripper as a function of its joint, in the frame of the hand.
+    """Geometry of a gripper as a function of its joint position, in the hand frame.
 
-    That frame has the origin of the grasp frame; z is the approach, and the fingers close along x.
+    The hand frame has the origin of the grasp frame. Its z axis is the approach direction, and the fingers close along
+    x.
 
     Attributes:
         joint: Actuated joint.
-        axes: (3, 3) axes of the hand in the grasp frame, as columns.
-        positions: (n,) joint positions from the lower to the upper limit [rad or m].
-        openings: (n,) free width between the pads [m].
-        pad_centres: (n,) z of the pads' centre [m].
-        tips: (n,) z of the foremost point of the fingers [m].
+        axes: Axes of the hand frame in the grasp frame, as columns, shape (3, 3).
+        positions: Joint positions from the lower to the upper limit, shape (n,) [rad or m].
+        openings: Free width between the pads, shape (n,) [m].
+        pad_centres: z of the pad centres, shape (n,) [m].
+        tips: z of the foremost point of the fingers, shape (n,) [m].
         pad_half_width: Half the width of a pad along y [m].
         pad_half_height: Half the height of a pad along z [m].
-        parts: Everything an object may run into: the fingers, the link they hang on, and what is fixed to that.
+        parts: Parts that may collide with an object: fingers, their parent link, and all links fixed to this link.
     """
 
     joint: str
@@ -87,45 +88,45 @@ class GripperGeometry:
 
     @property
     def max_opening(self) -> float:
-        """Greatest free width between the pads [m]."""
+        """Maximum free width between the pads [m]."""
         return float(self.openings.max())
 
     @property
     def closed_position(self) -> float:
-        """Joint position with the smallest free width [rad or m]."""
+        """Joint position with the minimum free width [rad or m]."""
         return float(self.positions[int(np.argmin(self.openings))])
 
     @property
     def max_tip(self) -> float:
-        """Foremost z the fingertips ever get to [m]."""
+        """Maximum z of the fingertips over all joint positions [m]."""
         return float(self.tips.max())
 
     def position_for(self, opening: float) -> float:
-        """Returns the joint position [rad or m] of a free width [m]; widths out of range give the nearest limit."""
+        """Returns the joint position [rad or m] for a free width [m], clamped to the joint limits."""
         order = np.argsort(self.openings)
         return float(np.interp(opening, self.openings[order], self.positions[order]))
 
     def pad_centre_at(self, opening: float) -> float:
-        """Returns z of the pads' centre [m] at a free width [m]."""
+        """Returns z of the pad centres [m] at a free width [m]."""
         order = np.argsort(self.openings)
         return float(np.interp(opening, self.openings[order], self.pad_centres[order]))
 
     def lowest_heights(self, openings: Array, top: Array, margin: float, with_pads: bool, floor: float) -> Array:
-        """Computes how far down the hand can come over an object without touching it.
+        """Computes the lowest collision-free heights of the hand over an object.
 
-        A hand that comes down along its approach direction sweeps everything behind its parts too. It is clear of a
-        point of the object exactly if, in the column of that point, the foremost point of each part is behind it.
+        A hand that descends along its approach direction also sweeps the volume behind its parts. Therefore the hand
+        does not touch a point of the object if, on the vertical line through this point, all parts end above the point.
 
         Args:
-            openings: (n,) free widths between the pads [m].
-            top: (m, 3) highest points of the object: x along the closing direction and y across, both from the middle
-                of the hand, z upwards [m].
-            margin: Room to keep around each part [m].
-            with_pads: False leaves the pads out, which touch the object in the end.
-            floor: Height below which the hand does not come anyway [m].
+            openings: Free widths between the pads, shape (n,) [m].
+            top: Highest points of the object, shape (m, 3) [m]: x along the closing direction and y across, relative
+                to the middle of the hand; z upwards.
+            margin: Clearance around each part [m].
+            with_pads: Whether the pads are included; they touch the object at the end of the motion.
+            floor: Lower bound of the result [m].
 
         Returns:
-            (n,) least z of the grasp frame [m], at least the floor.
+            Minimum z of the grasp frame, shape (n,) [m], at least the floor.
         """
         samples = [int(np.argmin(np.abs(self.openings - opening))) for opening in openings]
         heights = np.full(len(samples), floor)
@@ -140,18 +141,15 @@ class GripperGeometry:
 
 
 def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
-    """Moves the gripper's joint through its range and measures the collision shapes of the hand.
+    """Returns the geometry of a gripper, computed from its collision shapes over the range of its joint.
 
     Args:
         urdf: Text of the robot description.
-        grasp_link: Grasp frame.
+        grasp_link: Link whose frame is the grasp frame.
         joint: Actuated joint of the fingers.
 
-    Returns:
-        The gripper's geometry.
-
     Raises:
-        GripperGeometryError: A link or joint is missing, or there are no two fingers with collision shapes.
+        GripperGeometryError: A link or joint is missing, or fewer than two fingers have collision shapes.
     """
     model = _Model(urdf)
     limit = model.joints[joint].limit if joint in model.joints else None
@@ -184,9 +182,12 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
 
 
 def _hand_axes(parts: list[HandPart], moving: list[str], origin: Array) -> Array:
-    """Returns the hand's axes (3, 3) in the grasp frame, from the two moving parts that approach each other most.
+    """Returns the axes of the hand in the grasp frame, from the two moving parts whose distance changes most.
 
-    The palm is where its collision shapes are, or else at the origin (3,) of the link that the fingers hang on.
+    Args:
+        parts: Parts of the hand in the grasp frame.
+        moving: Finger links.
+        origin: Origin of the parent link of the fingers, shape (3,) [m]; replaces a palm without collision shapes.
     """
     centres = np.array([part.corners.mean(axis=1) for part in parts if part.link in moving])  # (parts, samples, 3)
     palm = [part.corners for part in parts if part.link not in moving]
@@ -205,7 +206,7 @@ def _hand_axes(parts: list[HandPart], moving: list[str], origin: Array) -> Array
 
 
 def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
-    """Returns the pads on the positive and on the negative side of the closing direction, x."""
+    """Returns the pad on the positive side and the pad on the negative side of the closing direction x."""
     spread = max(range(SAMPLES), key=lambda sample: np.ptp([part.corners[sample, :, 0].mean() for part in fingers]))
     right = [part for part in fingers if part.corners[spread, :, 0].mean() > 0]
     left = [part for part in fingers if part.corners[spread, :, 0].mean() <= 0]
@@ -229,7 +230,7 @@ def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
 
 
 def _face_each_other(corners: Array, others: Array) -> bool:
-    """Checks that two parts (k, 3) overlap when they are seen along the closing direction."""
+    """Returns whether the projections of two parts along the closing direction overlap."""
     low = np.maximum(corners.min(axis=0), others.min(axis=0))
     high = np.minimum(corners.max(axis=0), others.max(axis=0))
     return bool((low[1:] < high[1:]).all())
@@ -253,7 +254,7 @@ def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iter
 
 
 class _Model:
-    """Forward kinematics of a URDF, as far as it is needed here."""
+    """Forward kinematics of a URDF."""
 
     def __init__(self, urdf: str) -> None:
         try:
@@ -266,7 +267,7 @@ class _Model:
         self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
 
     def driven_joints(self, joint: str) -> set[str]:
-        """Returns a joint and its mirror image: two jaws that one motor drives often have no mimic tag (Fetch)."""
+        """Returns a joint and its mirrored joints; jaws with a common motor often have no mimic tag (Fetch)."""
         return {joint} | {name for name in self.joints if self._is_mirrored(self.joints[joint], self.joints[name])}
 
     def _is_mirrored(self, joint: Joint, other: Joint) -> bool:
@@ -278,7 +279,7 @@ class _Model:
         )
 
     def moving_links(self, joint: str) -> list[str]:
-        """Links that move with a joint, with its mirror image, or with a joint that mimics one of these."""
+        """Returns the links moved by a joint, by its mirrored joints, or by mimic joints of these joints."""
         driven, moving = self.driven_joints(joint), []
         for link in self.links:
             name = self.parent_joint.get(link)
@@ -291,7 +292,7 @@ class _Model:
         return moving
 
     def hand_links(self, joint: str) -> list[str]:
-        """Moving links, the link they hang on, and every link that is fixed to that."""
+        """Returns the moving links, their parent link, and all links fixed to the parent link."""
         links = {self.joints[joint].parent, *self.moving_links(joint)}
         while True:
             ends = [{other.parent, other.child} for other in self.joints.values() if other.kind == "fixed"]
@@ -301,11 +302,11 @@ class _Model:
             links |= more
 
     def origin_of_fingers(self, frame: str, joint: str) -> Array:
-        """Origin (3,) of the link that the fingers of a joint hang on, in the frame of another link."""
+        """Returns the origin of the parent link of the fingers in the frame of another link, shape (3,) [m]."""
         return (np.linalg.inv(self.pose(frame, {})) @ self.pose(self.joints[joint].parent, {}))[:3, 3]
 
     def bodies_of(self, link: str) -> Iterator[ConvexBody]:
-        """Collision shapes of a link in its own frame."""
+        """Yields the collision shapes of a link in the link frame."""
         for collision in self.links[link].collisions:
             try:
                 yield collision_body(collision).moved(collision.origin.matrix())
@@ -313,7 +314,7 @@ class _Model:
                 raise GripperGeometryError(f"the collision shape of link '{link}' {error}") from error
 
     def pose(self, link: str, state: dict[str, float]) -> Array:
-        """Pose (4, 4) of a link in the root link."""
+        """Returns the pose of a link in the root link, shape (4, 4)."""
         transform = np.eye(4)
         name = self.parent_joint.get(link)
         while name is not None:
@@ -324,7 +325,7 @@ class _Model:
 
 
 def _motion(joint: Joint, state: dict[str, float]) -> Array:
-    """Returns the transform of a joint's position relative to its origin (4, 4)."""
+    """Returns the transform of a joint position relative to the joint origin, shape (4, 4)."""
     value = state.get(joint.name, 0.0)
     if joint.mimic is not None:
         value = joint.mimic.multiplier * state.get(joint.mimic.leader, 0.0) + joint.mimic.offset
@@ -338,5 +339,5 @@ def _motion(joint: Joint, state: dict[str, float]) -> Array:
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
-    """Returns the rotation matrix about an axis by an angle [rad]."""
+    """Returns the matrix of a rotation about an axis by an angle [rad]."""
     return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds how far a hand can advance over an object without touching it, and how wide it has to open for that.
+"""Computes the lowest collision-free height of a hand over an object, and the opening for this height.
 
-Everything here is in a frame whose z points against the approach of the hand: for a hand from above, upwards. The
-object is given by points on its surface.
+All coordinates are in a frame whose z axis points against the approach direction: upwards, if the hand approaches from
+above. The object is represented by points on its surface.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ Array = npt.NDArray[np.float64]
 
 CONTACT_DEPTH_M = 0.001
 CLOSING_CLEARANCE_M = 0.002
-"""Room between the object and what is not a pad when the pads touch it: the spacing error of surface points."""
+"""Clearance between the object and all parts except the pads while the hand closes; covers the point spacing."""
 HEIGHT_TOLERANCE_M = 0.0005
-"""Heights that differ by less count as the same."""
+"""Tolerance for the comparison of heights."""
 HEIGHT_ROUNDS = 4
-"""How often a height is tried before a place is given up."""
+"""Maximum number of iterations over heights per hand pose."""
 COLUMN_M = 0.004
-"""Width of the columns in which only the highest point is kept: about the spacing of surface points."""
+"""Cell size of the grid that keeps the highest point per cell: about the spacing of surface points."""
 CLOSING_STEPS, OPENING_STEPS = 5, 8
-"""Openings that are tried: below the width of the object, and above it."""
+"""Numbers of sampled openings below and above the opening that clears the object."""
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """What passes between the pads while the hand advances.
+    """Part of the object that passes between the pads during the approach.
 
     Attributes:
-        middle: Middle of what the pads touch, along the closing direction [m].
-        width: Opening at which the pads touch [m].
-        half_width: Farthest the object reaches from the middle of the hand [m].
-        clearance: Room to keep on each side [m].
+        middle: Midpoint of the touched points along the closing direction [m].
+        width: Opening at which the pads touch the object [m].
+        half_width: Maximum distance of a passing point from the midpoint along the closing direction [m].
+        clearance: Clearance on each side [m].
     """
 
     middle: float
@@ -50,13 +50,13 @@ class Passage:
 def passage_between(
     touched: Array, passed: Array, gripper: GripperGeometry, settings: HandMotionSettings
 ) -> Passage | None:
-    """Measures what passes between the pads; None where the hand does not open wide enough.
+    """Returns the passage of an object between the pads, or None if the maximum opening is too small.
 
     Args:
-        touched: (n,) positions of the points that the pads touch, along the closing direction [m].
-        passed: (m,) those of the points that the hand has passed by then [m].
+        touched: Coordinates of the touched points along the closing direction, shape (n,) [m].
+        passed: Coordinates of the points that pass between the pads, shape (m,) [m].
         gripper: Geometry of the hand.
-        settings: The room that the hand keeps.
+        settings: Clearances of the hand.
     """
     low, high = float(touched.min()), float(touched.max())
     middle = (low + high) / 2
@@ -68,34 +68,34 @@ def passage_between(
 
 
 def highest_points(points: Array) -> Array:
-    """Keeps the highest of the points (n, 3) in each small column along z: what the hand meets first."""
+    """Returns the highest point in each cell of a horizontal grid; `points` has the shape (n, 3) [m]."""
     order = np.argsort(-points[:, 2])
     _, first = np.unique(np.floor(points[order, :2] / COLUMN_M).astype(np.int64), axis=0, return_index=True)
     return points[order[first]]
 
 
-def lowest_height(top: Array, passage: Passage, wanted: float, gripper: GripperGeometry) -> tuple[float, float]:
-    """Chooses the opening with which the hand can advance to a wanted height, or else the farthest.
+def lowest_height(top: Array, passage: Passage, desired: float, gripper: GripperGeometry) -> tuple[float, float]:
+    """Returns the lowest collision-free height of the hand, and the smallest opening that reaches this height.
 
     Args:
-        top: (n, 3) highest points of the object, from the middle of the hand [m].
-        passage: What the pads have to pass.
-        wanted: Height of the grasp frame that is wanted [m].
+        top: Highest points of the object, relative to the middle of the hand, shape (n, 3) [m].
+        passage: Part of the object between the pads.
+        desired: Desired height of the grasp frame [m]; lower bound of the result.
         gripper: Geometry of the hand.
 
     Returns:
-        The least height at which the hand is clear all the time [m], and the opening to advance with [m].
+        Height without a collision during approach and closing [m], and opening during the approach [m].
     """
     needed = 2 * (passage.half_width + passage.clearance)
     closing = np.linspace(passage.width, needed, CLOSING_STEPS, endpoint=False)
     advancing = np.linspace(needed, gripper.max_opening, OPENING_STEPS)
     openings = np.concatenate([closing, advancing])
     while_closing = np.maximum.accumulate(
-        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=wanted)
+        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=desired)
     )
-    # The pads' own room is in the opening already; without the last bit, rounding would open the hand a step wider.
+    # The openings include the clearance of the pads. Subtracting the contact depth absorbs rounding errors.
     while_advancing = gripper.lowest_heights(
-        advancing, top, max(0.0, passage.clearance - CONTACT_DEPTH_M), with_pads=True, floor=wanted
+        advancing, top, max(0.0, passage.clearance - CONTACT_DEPTH_M), with_pads=True, floor=desired
     )
     heights = np.maximum(while_closing[CLOSING_STEPS:], while_advancing)
     chosen = int(np.argmax(heights <= heights.min() + HEIGHT_TOLERANCE_M))

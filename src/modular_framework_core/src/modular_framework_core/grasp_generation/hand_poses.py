@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Places a two-finger hand on a pair of contacts: from which side, how deep, and how wide open."""
+"""Computes poses and openings of a two-finger hand for a pair of contacts."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ Array = npt.NDArray[np.float64]
 
 DOWN = np.array([0.0, 0.0, -1.0])
 UPRIGHT = 1e-3
-LEAST_FACING = 0.3
+MIN_FACING_COSINE = 0.3
 LEVEL = 0.05
-"""An approach of which less than this share leads down does not lift the hand when it is drawn back."""
+"""Minimum downward component of an approach direction for which a retreat lifts the hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandSettings(HandMotionSettings):
-    """Limits of a usable pose of the hand.
+    """Settings of the hand pose.
 
     Attributes:
         approach_step_rad: Step between approach directions around a closing axis [rad].
-        max_approach_angle_rad: Greatest angle between the approach and straight down [rad].
-        cone_cosine: Least cosine between the line of the contacts and the normals there: the friction cone.
+        max_approach_angle_rad: Maximum angle between the approach direction and straight down [rad].
+        cone_cosine: Cosine of the half angle of the friction cone.
     """
 
     approach_step_rad: float = math.radians(30.0)
@@ -50,16 +50,16 @@ class HandSettings(HandMotionSettings):
 
 @dataclass(frozen=True, slots=True)
 class HandPose:
-    """A pose at which the pads close on an object.
+    """Pose of the hand at which the pads close on an object.
 
     Attributes:
-        position: (3,) the grasp frame [m].
-        axes: (3, 3) axes of the hand, as columns: closing, across and approach.
-        contacts: (2, 3) middle of what each pad touches [m].
-        alignment: The lesser cosine between the line of the contacts and the surface's normal at each.
-        width: Distance between the pads when they touch [m].
-        opening: Free width between the pads while the hand advances [m].
-        overlap: Length of the pads, along the approach, that touches [m].
+        position: Position of the grasp frame, shape (3,) [m].
+        axes: Axes of the hand, as columns: closing, across, approach; shape (3, 3).
+        contacts: Centre of the contact area of each pad, shape (2, 3) [m].
+        alignment: Smaller cosine between the line through the contacts and the surface normal at a contact.
+        width: Distance between the pads at contact [m].
+        opening: Free width between the pads during the approach [m].
+        overlap: Length of the contact along the approach direction [m].
     """
 
     position: Array
@@ -72,17 +72,17 @@ class HandPose:
 
     @property
     def approach_angle(self) -> float:
-        """Angle between the approach and straight down [rad]."""
+        """Angle between the approach direction and straight down [rad]."""
         return math.acos(float(np.clip(self.axes[:, 2] @ DOWN, -1.0, 1.0)))
 
 
 def hand_axes_for(axis: Array, settings: HandSettings) -> Iterator[Array]:
-    """Yields the axes of the hand (3, 3) for a closing axis (3,), the most downward approach first."""
+    """Yields axes of the hand, shape (3, 3), for a closing axis of shape (3,); the steepest approach comes first."""
     across = np.cross(axis, DOWN)
     if np.linalg.norm(across) < UPRIGHT:
         across = np.array([1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
-    steepest = np.cross(across, axis)  # of the directions at right angles to the axis, the one that leads down most
+    steepest = np.cross(across, axis)  # the steepest direction perpendicular to the axis
     count = int(math.pi / settings.approach_step_rad)
     angles = [0.0, *(sign * step * settings.approach_step_rad for step in range(1, count + 1) for sign in (1.0, -1.0))]
     for angle in angles:
@@ -102,22 +102,19 @@ def place_hand(
     gripper: GripperGeometry,
     settings: HandSettings,
 ) -> HandPose | None:
-    """Finds how far the hand can advance so that the pads close on a pair of contacts.
+    """Returns the deepest pose of the hand at which the pads close on a pair of contacts, or None without such a pose.
 
-    The pads are to touch around the pair, with nothing else of the hand near the object on the way or while it closes,
-    and nothing of the hand near the support. How wide the hand must open depends on how deep it goes, and how deep it
-    can go on how wide it is: a few rounds settle both, since the hand is only ever drawn back.
+    Only the pads may touch the object, and all parts keep their clearances from the object and the support. The opening
+    depends on the depth of the pose, and the allowed depth depends on the opening. An iteration computes both; it
+    converges, because each step only retracts the hand.
 
     Args:
-        pair: Where the pads are to touch.
-        axes: (3, 3) axes of the hand, as columns: closing, across and approach.
+        pair: Pair of contacts.
+        axes: Axes of the hand, as columns: closing, across, approach; shape (3, 3).
         surface: Points on the object.
-        support_z: Height of what the object stands on [m].
+        support_z: Height of the surface that supports the object [m].
         gripper: Geometry of the hand.
-        settings: What counts as usable.
-
-    Returns:
-        The pose; None when there is none.
+        settings: Settings of the hand pose.
     """
     view = _View.along(pair, axes, surface, gripper, settings)
     pad_offset = gripper.pad_centre_at(pair.width)
@@ -142,16 +139,16 @@ def place_hand(
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """The object as the hand sees it, from the middle of the pair: x closing, y across, z against the approach.
+    """Object in a frame at the midpoint of the pair: x closing, y across, z against the approach direction.
 
     Attributes:
-        pair: Where the pads are to touch.
-        axes: (3, 3) axes of the hand in the world, as columns: closing, across and approach.
-        points: (n, 3) points that can come between the pads [m].
-        normals: (n, 3) outward normals there.
-        top: (m, 3) of all points, those that the hand meets first [m].
+        pair: Pair of contacts.
+        axes: Axes of the hand in the world, as columns: closing, across, approach; shape (3, 3).
+        points: Points that can be between the pads, shape (n, 3) [m].
+        normals: Outward normals at these points, shape (n, 3).
+        top: Highest points of the object in this frame, shape (m, 3) [m].
         gripper: Geometry of the hand.
-        settings: What counts as usable.
+        settings: Settings of the hand pose.
     """
 
     pair: ContactPair
@@ -206,7 +203,7 @@ class _View:
         return None if passage is None else _Hold(low, high, alignment, overlap, passage)
 
     def height_over_support(self, hold: _Hold, opening: float, support_z: float) -> float:
-        """Returns the least height of the grasp frame, against the approach, at which it keeps off the support [m]."""
+        """Returns the minimum height of the grasp frame at which the hand keeps its clearance from the support [m]."""
         gripper, axes = self.gripper, self.axes
         samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
         samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
@@ -233,7 +230,7 @@ class _View:
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    """What the pads touch at one height: the centre of each side, how they face each other, and what passes."""
+    """Contact of the pads at one height: contact centre of each side, alignment, overlap, and passage."""
 
     low: Array
     high: Array
@@ -243,8 +240,8 @@ class _Hold:
 
 
 def _side(points: Array, normals: Array, outermost: npt.NDArray[np.bool_], sign: float) -> tuple[Array, Array] | None:
-    """Returns the centre and the mean normal of the outermost points of a side that face the pad."""
-    facing = outermost & (sign * normals[:, 0] > LEAST_FACING)
+    """Returns the centre and the mean normal of the outermost points that face a pad, or None without such points."""
+    facing = outermost & (sign * normals[:, 0] > MIN_FACING_COSINE)
     if not facing.any():
         return None
     normal = normals[facing].mean(axis=0)

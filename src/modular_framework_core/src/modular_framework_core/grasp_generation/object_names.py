@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares names of models with ids of collision objects."""
+"""Matches ids of collision objects with model names."""
 
 from __future__ import annotations
 
 
-def is_named(object_id: str, wanted: str) -> bool:
-    """Returns whether an object id belongs to a model, or is the id itself; an empty name matches all."""
-    return not wanted or object_id == wanted or object_id.startswith(f"{wanted}__")
+def is_named(object_id: str, name: str) -> bool:
+    """Returns whether `name` is the object id or the model of the object; an empty name matches all objects."""
+    return not name or object_id == name or object_id.startswith(f"{name}__")

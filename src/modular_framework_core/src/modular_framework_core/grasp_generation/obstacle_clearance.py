@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures how near a hand comes to the other objects of the scene while it advances to a grasp and closes."""
+"""Computes the distance between a hand and the obstacles during the approach and while the hand closes."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ CLOSING_SAMPLES = 4
 
 
 class ObstacleClearance:
-    """Distances between a hand and the obstacles around an object, exact for their meshes (with Coal).
+    """Distances between a hand and the meshes of obstacles, computed by Coal.
 
     Args:
-        obstacles: The other objects of the scene.
+        obstacles: All objects of the scene except the target.
         gripper: Geometry of the hand.
-        limit_m: Greatest distance of interest [m]; obstacles farther away are passed over.
+        limit_m: Maximum distance of interest [m]; obstacles beyond this distance are ignored.
     """
 
     def __init__(self, obstacles: Sequence[SceneObject], gripper: GripperGeometry, limit_m: float = 0.1) -> None:
@@ -39,43 +39,41 @@ class ObstacleClearance:
     def of_grasp(
         self, position: Array, hand_axes: Array, openings: tuple[float, float], approach_distance_m: float
     ) -> float:
-        """Computes the least distance from the obstacles [m]; 0 when the hand touches one.
+        """Returns the distance between the hand and the nearest obstacle, at most the limit [m]; 0 in collision.
 
         Args:
-            position: (3,) the grasp frame at the grasp, in the planning frame [m].
-            hand_axes: (3, 3) axes of the hand in the planning frame, as columns: closing, across and approach.
-            openings: Free width between the pads while the hand advances, and when they touch the object [m].
-            approach_distance_m: How far the hand advances [m].
-
-        Returns:
-            The distance, at most the limit.
+            position: Position of the grasp frame in the planning frame, shape (3,) [m].
+            hand_axes: Axes of the hand in the planning frame, as columns: closing, across, approach; shape (3, 3).
+            openings: Free width between the pads during the approach, and at contact [m].
+            approach_distance_m: Length of the approach [m].
         """
         start = position - approach_distance_m * hand_axes[:, 2]
-        room = self._radius + self._limit
-        low, high = np.minimum(start, position) - room, np.maximum(start, position) + room
-        near = [body for body, least, most in self._bodies if (least < high).all() and (most > low).all()]
+        reach = self._radius + self._limit
+        low, high = np.minimum(start, position) - reach, np.maximum(start, position) + reach
+        near = [body for body, lower, upper in self._bodies if (lower < high).all() and (upper > low).all()]
         if not near:
             return self._limit
         advancing, closed = (self._sample(opening) for opening in openings)
         closing = np.unique(np.linspace(advancing, closed, CLOSING_SAMPLES).round().astype(int)).tolist()
-        place = coal.Transform3s(hand_axes, position)
-        least = self._limit
-        for number in range(len(self._gripper.parts)):
-            hulls = [self._hull(number, advancing, approach_distance_m)]
-            hulls += [self._hull(number, sample, 0.0) for sample in closing if sample != advancing]
+        pose = coal.Transform3s(hand_axes, position)
+        min_distance = self._limit
+        for index in range(len(self._gripper.parts)):
+            hulls = [self._hull(index, advancing, approach_distance_m)]
+            hulls += [self._hull(index, sample, 0.0) for sample in closing if sample != advancing]
             for hull in hulls:
                 for body in near:
-                    least = min(least, coal.distance(hull, place, body, coal.Transform3s.Identity(),
-                                                     coal.DistanceRequest(), coal.DistanceResult()))  # fmt: skip
-                    if least <= 0.0:
+                    distance = coal.distance(hull, pose, body, coal.Transform3s.Identity(),
+                                             coal.DistanceRequest(), coal.DistanceResult())  # fmt: skip
+                    min_distance = min(min_distance, distance)
+                    if min_distance <= 0.0:
                         return 0.0
-        return float(least)
+        return float(min_distance)
 
     def _sample(self, opening: float) -> int:
         return int(np.argmin(np.abs(self._gripper.openings - opening)))
 
     def _hull(self, part: int, sample: int, sweep: float) -> Any:
-        """Returns a part of the hand, swept from so far behind [m], in the frame of the hand."""
+        """Returns the convex hull of a part of the hand, swept over the last `sweep` [m] of the approach."""
         key = (part, sample, sweep)
         if key not in self._hulls:
             corners = self._gripper.parts[part].corners[sample]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and ranks the ways in which a two-finger hand can close on pairs of contacts.
+"""Finds and ranks grasps of a two-finger hand at pairs of contacts.
 
-Around the closing axis of each pair the hand is turned through several approach directions and placed
-(:mod:`hand_poses`). Poses at which it would touch another object on its way, or while it closes, are left out. What
-remains is ranked by how squarely the sides face each other, how near the closing axis is to the centre of mass, the
-distance from other objects, how much of the pads touches, and how much room there is between the pads.
+Each pair is combined with several approach directions around its closing axis (:mod:`hand_poses`). Poses with a
+collision during the approach or the closing motion are rejected. The quality of a grasp depends on the alignment of the
+contact normals, the distance of the closing axis from the centre of mass, the distance from other objects, the overlap
+of pads and object, and the opening.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from modular_framework_core.grasp_generation.obstacle_clearance import ObstacleC
 T = TypeVar("T")
 
 CENTRED_M = 0.06
-"""Distance of the closing axis from the centre of mass at which a grasp is no longer centred."""
+"""Distance of the closing axis from the centre of mass beyond which a grasp counts as not centred."""
 ANGLE_BINS = 4
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
-FAR_TRAVEL, TRAVEL_SHARE = 1.5, 0.2
-"""A joint that moves this far [rad] between two poses of a grasp has swung to another posture of the arm."""
+FAR_TRAVEL, TRAVEL_WEIGHT = 1.5, 0.2
+"""Joint travel of a change of the arm configuration [rad], and weight of the joint travel in the quality."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairGraspSettings:
-    """What counts as usable, how much is tried, and how grasps are ranked.
+    """Settings of the search for grasps at pairs of contacts.
 
     Attributes:
-        hand: How the hand comes to the pairs, is placed on them, and leaves.
-        full_clearance_m: Distance from other objects beyond which more is no better [m].
-        max_poses: Greatest number of poses of the hand that are tried.
-        max_candidates: Greatest number of grasps to return.
+        hand: Settings of hand pose and hand motion.
+        full_clearance_m: Distance from other objects beyond which the quality does not increase [m].
+        max_poses: Maximum number of hand poses to check.
+        max_candidates: Maximum number of returned grasps.
     """
 
     hand: HandSettings = field(default_factory=HandSettings)
@@ -49,24 +49,24 @@ class PairGraspSettings:
     max_candidates: int = 80
 
     def squareness(self, alignment: float) -> float:
-        """Returns how squarely two sides face each other: 1 for parallel sides, 0 at the edge of the friction cone."""
-        least = self.hand.cone_cosine
-        return max(0.0, (alignment - least) / (1.0 - least))
+        """Returns the alignment scaled to [0, 1]: 1 for parallel sides, 0 at the edge of the friction cone."""
+        edge = self.hand.cone_cosine
+        return max(0.0, (alignment - edge) / (1.0 - edge))
 
     def widest(self, gripper: GripperGeometry) -> float:
-        """Returns the greatest distance of two contacts that fit between the pads of a gripper [m]."""
+        """Returns the maximum distance of two contacts that fit between the pads of a gripper [m]."""
         return gripper.max_opening - 2 * self.hand.min_finger_clearance_m
 
 
 @dataclass(frozen=True, slots=True)
 class PairGrasp:
-    """One way to grasp.
+    """Grasp at a pair of contacts.
 
     Attributes:
-        pose: The hand at the grasp.
-        clearance: Least distance from other objects on the way [m], at most `full_clearance_m` of the settings.
+        pose: Pose of the hand at the grasp.
+        clearance: Minimum distance from other objects during the motion [m], at most `full_clearance_m`.
         offset: Distance of the closing axis from the centre of mass [m].
-        quality: Rank in [0, 1]; more is better.
+        quality: Quality in [0, 1]; higher is better.
     """
 
     pose: HandPose
@@ -76,16 +76,16 @@ class PairGrasp:
 
 
 def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: PairGraspSettings) -> list[PairGrasp]:
-    """Finds the grasps of an object at pairs of contacts; the same query gives the same grasps.
+    """Finds the grasps of an object at pairs of contacts; the result is deterministic.
 
     Args:
-        pairs: The pairs.
-        query: The object, what stands around it, and the hand.
-        settings: What counts as usable.
+        pairs: Pairs of contacts.
+        query: Object, obstacles and hand.
+        settings: Settings of the search.
 
     Returns:
-        Usable grasps in the order in which their reachability should be checked: the best of each inclination of the
-        hand in turn, since the arm may reach an object in one of them only.
+        Collision-free grasps in the order for reachability checks. The order alternates between inclinations of the
+        hand, best grasps first, because the arm may reach the object with a single inclination only.
     """
     surroundings = ObstacleClearance(query.obstacles, query.gripper, settings.full_clearance_m)
     grasps: list[PairGrasp] = []
@@ -102,18 +102,18 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
             grasps.append(_ranked(pose, clearance, query, settings))
             if len(grasps) >= settings.max_candidates:
                 break
-    return _in_turns([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
+    return _interleaved([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
 
 
 def candidates_of(
     grasps: Sequence[PairGrasp], gripper: GripperGeometry, settings: PairGraspSettings
 ) -> list[GraspCandidate]:
-    """Returns the candidates of pair grasps: each grasp, then each grasp with the hand turned by 180 degrees.
+    """Returns the candidates of pair grasps: all grasps, then all grasps with the hand rotated by 180 degrees.
 
     Args:
-        grasps: Poses and openings of the hand.
-        gripper: Gripper that grasps.
-        settings: Settings of the search; give the distances of approach and lift.
+        grasps: Grasps at pairs of contacts.
+        gripper: Geometry of the hand.
+        settings: Settings of the search, including the distances of approach and lift.
     """
     return [
         GraspCandidate(
@@ -130,32 +130,32 @@ def candidates_of(
 
 
 def quality_with_travel(quality: float, joint_travel: float) -> float:
-    """Ranks by the quality of the hold [0, 1], and by how little the arm moves between the poses [rad or m]."""
-    return (1.0 - TRAVEL_SHARE) * quality + TRAVEL_SHARE * (1.0 - min(1.0, joint_travel / FAR_TRAVEL))
+    """Returns the quality of a grasp reduced by the joint travel [rad or m] between its poses; both are in [0, 1]."""
+    return (1.0 - TRAVEL_WEIGHT) * quality + TRAVEL_WEIGHT * (1.0 - min(1.0, joint_travel / FAR_TRAVEL))
 
 
 def _poses_to_try(
     pairs: Sequence[ContactPair], query: GraspQuery, settings: PairGraspSettings
 ) -> Iterator[tuple[ContactPair, np.ndarray]]:
-    """Yields pairs with axes of the hand: of each inclination in turn, well aligned and centred pairs first."""
+    """Yields pairs with axes of the hand; alternates between inclinations, well aligned and centred pairs first."""
     centroid = query.target.surface.centroid
     tries = []
     for pair in pairs:
-        worth = settings.squareness(pair.alignment) + _centred(pair.distance_from(centroid))
+        score = settings.squareness(pair.alignment) + _centred(pair.distance_from(centroid))
         for axes in hand_axes_for(pair.axis, settings.hand):
             angle = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
-            tries.append((angle, worth, (pair, axes)))
-    yield from _in_turns(tries, settings)
+            tries.append((angle, score, (pair, axes)))
+    yield from _interleaved(tries, settings)
 
 
-def _in_turns(items: list[tuple[float, float, T]], settings: PairGraspSettings) -> list[T]:
-    """Orders items (angle of approach, worth, item): the best of each bin of angles, then the second of each, ..."""
+def _interleaved(items: list[tuple[float, float, T]], settings: PairGraspSettings) -> list[T]:
+    """Orders items (approach angle, score, item): the best item of each bin of angles, then the second best, ..."""
     width = settings.hand.max_approach_angle_rad / ANGLE_BINS
     bins: list[list[tuple[float, float, T]]] = [[] for _ in range(ANGLE_BINS)]
     for item in items:
         bins[min(ANGLE_BINS - 1, int(item[0] / width))].append(item)
-    turns = [sorted(each, key=lambda item: -item[1]) for each in bins]
-    return [item[2] for turn in itertools.zip_longest(*turns) for item in turn if item is not None]
+    ranked_bins = [sorted(each, key=lambda item: -item[1]) for each in bins]
+    return [item[2] for rank in itertools.zip_longest(*ranked_bins) for item in rank if item is not None]
 
 
 def _ranked(pose: HandPose, clearance: float, query: GraspQuery, settings: PairGraspSettings) -> PairGrasp:

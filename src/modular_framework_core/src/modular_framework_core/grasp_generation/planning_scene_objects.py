@@ -17,17 +17,17 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 
 
 class SceneObjectError(ValueError):
-    """A collision object cannot be understood; the text says which part."""
+    """A collision object has an invalid part; the text names the part."""
 
 
 @dataclass(frozen=True)
 class SceneObject:
-    """An object of the planning scene.
+    """Object of the planning scene.
 
     Attributes:
         name: Id of the object.
-        surface: Points on its surface, in the planning frame.
-        solids: Its parts as closed meshes in the planning frame; empty where only the surface is known.
+        surface: Points on the surface, in the planning frame.
+        solids: Parts as closed meshes in the planning frame; empty if only the surface is known.
     """
 
     name: str
@@ -36,34 +36,34 @@ class SceneObject:
 
     @cached_property
     def centre(self) -> npt.NDArray[np.float64]:
-        """Centre of the bounding box in the planning frame (3,) [m]."""
+        """Centre of the bounding box in the planning frame, shape (3,) [m]."""
         return (self.surface.points.min(axis=0) + self.surface.points.max(axis=0)) / 2
 
     @property
     def bottom(self) -> float:
-        """Lowest z in the planning frame [m]."""
+        """Minimum z in the planning frame [m]."""
         return float(self.surface.points[:, 2].min())
 
 
 @dataclass(frozen=True, slots=True)
 class CropBox:
-    """The search volume for objects: a box along the axes of the planning frame.
+    """Search volume for objects: a box along the axes of the planning frame.
 
     Attributes:
-        low: Smallest x, y, z [m].
-        high: Greatest x, y, z [m].
+        low: Minimum x, y, z [m].
+        high: Maximum x, y, z [m].
     """
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
 
     def holds(self, point: npt.NDArray[np.float64]) -> bool:
-        """Returns whether a point (3,) is inside."""
+        """Returns whether a point of shape (3,) is inside the box."""
         return bool(np.all(point >= self.low) and np.all(point <= self.high))
 
 
 def rotation_matrix(quaternion: Any) -> npt.NDArray[np.float64]:
-    """Returns the rotation matrix of a quaternion message; an unset one (all zero) is no rotation."""
+    """Returns the rotation matrix of a quaternion message; a quaternion of zeros is the identity."""
     values = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
     return np.eye(3) if values @ values < 1e-12 else Rotation.from_quat(values).as_matrix()
 
@@ -74,7 +74,7 @@ def _translation(position: Any) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A part of an object: points on its surface, and its mesh."""
+    """Part of an object: points on the surface, and the mesh."""
 
     surface: Surface
     solid: TriangleMesh
@@ -99,8 +99,8 @@ def _primitive(primitive: Any, where: str) -> _Part:
             return _Part(surface_points.cylinder(sizes[0], sizes[1], 0.0), solid_meshes.cone(sizes[0], sizes[1]))
         case _:
             raise SceneObjectError(
-                f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed are box "
-                "(3), sphere (1), cylinder (2) and cone (2)"
+                f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed: box "
+                "(3), sphere (1), cylinder (2), cone (2)"
             )
 
 
@@ -108,13 +108,13 @@ def scene_object(message: Any) -> SceneObject | None:
     """Converts a moveit_msgs/CollisionObject.
 
     Args:
-        message: The object; its parts are placed relative to its own pose.
+        message: Message; the poses of the parts are relative to the pose of the object.
 
     Returns:
-        The object; None when it has no solid part (a plane).
+        The object; None if it has no solid part, such as a plane.
 
     Raises:
-        SceneObjectError: A part cannot be understood.
+        SceneObjectError: A part is invalid.
     """
     parts = [
         _primitive(shape, f"object '{message.id}', primitive {number}").placed(pose)
@@ -126,7 +126,7 @@ def scene_object(message: Any) -> SceneObject | None:
         if not len(triangles) or triangles.max() >= len(vertices):
             raise SceneObjectError(
                 f"object '{message.id}' has a mesh of {len(vertices)} vertices and {len(triangles)} "
-                "triangles that does not hold together"
+                "triangles; a mesh needs triangles, and vertices for all indices"
             )
         solid = solid_meshes.outward(TriangleMesh(vertices, triangles))
         parts.append(_Part(surface_points.mesh(vertices, triangles), solid).placed(pose))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the parameters that all grasp generators have, as parameters/grasp_generator.yaml declares them."""
+"""Reads the common parameters of all grasp generators, declared in parameters/grasp_generator.yaml."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ class GeneratorSettings:
 
     Attributes:
         frame: Frame of the crop box and of the grasps (``origin_frame_name``).
-        crop: Where objects are looked for (``min_x_crop`` ... ``max_z_crop``).
+        crop: Search volume for objects (``min_x_crop`` ... ``max_z_crop``).
         arm_group: Planning group whose tip is the grasp frame (``arm_group_name``).
-        gripper_joint: Actuated joint of the gripper (``~gripper_joint``); it has no default.
-        object_name: Object to grasp; empty for all in the crop box (``~object_name``).
-        name_prefix: Grasps are stored as <prefix>1, <prefix>2, ...; empty stores them anonymously (``~name_prefix``).
-        hand_id: Written into the grasps (``manipulator_group_name``).
+        gripper_joint: Actuated joint of the gripper (``~gripper_joint``, required).
+        object_name: Object to grasp; empty for all objects in the crop box (``~object_name``).
+        name_prefix: Prefix of the grasp names <prefix>1, <prefix>2, ...; empty for anonymous grasps (``~name_prefix``).
+        hand_id: Hand id of the grasps (``manipulator_group_name``).
         torque: Torque intensity of the grasp in (0, 1] (``~torque_intensity``).
-        max_grasps: Greatest number of grasps to store (``~max_grasps``).
-        max_checks: Greatest number of grasps whose reachability is checked (``~max_checks``).
-        check_reachability: Whether inverse kinematics must have a solution at every stage (``~check_reachability``).
-        scene_timeout_s: Wait for an object before failure is signalled [s of the ROS clock] (``~scene_timeout``).
-        seed: Seed of every random choice (``/seed``).
+        max_grasps: Maximum number of stored grasps (``~max_grasps``).
+        max_checks: Maximum number of reachability checks (``~max_checks``).
+        check_reachability: Whether every stage of a grasp needs a solution of inverse kinematics
+            (``~check_reachability``).
+        scene_timeout_s: Maximum wait for an object [s of the ROS clock] (``~scene_timeout``).
+        seed: Seed of all random numbers (``/seed``).
     """
 
     frame: str
@@ -52,7 +53,7 @@ def read_settings() -> GeneratorSettings:
     """Reads the parameters.
 
     Raises:
-        ParameterError: One is not allowed.
+        ParameterError: A parameter is missing or invalid.
     """
     read = DeclaredParameters("modular_framework_core", "grasp_generator").value
     low, high = ([read(f"{end}_{axis}_crop") for axis in "xyz"] for end in ("min", "max"))
@@ -74,10 +75,10 @@ def read_settings() -> GeneratorSettings:
 
 
 def read_hand_motion(read: ReadNumber) -> HandMotionSettings:
-    """Reads the parameters that grasp methods share.
+    """Returns the settings of the hand motion, which grasp methods share.
 
     Args:
-        read: Reads a parameter.
+        read: Function that reads a parameter.
     """
     return HandMotionSettings(
         approach_distance_m=read("~approach_distance"),
@@ -90,11 +91,11 @@ def read_hand_motion(read: ReadNumber) -> HandMotionSettings:
 
 
 def read_pair_grasps(cone_cosine: float, read: ReadNumber) -> PairGraspSettings:
-    """Reads the parameters of methods that begin with pairs of contacts.
+    """Returns the settings of grasp methods that search pairs of contacts.
 
     Args:
         cone_cosine: Cosine of the half angle of the friction cone.
-        read: Reads a parameter.
+        read: Function that reads a parameter.
     """
     hand = HandSettings(
         **asdict(read_hand_motion(read)),
@@ -111,17 +112,17 @@ def read_pair_grasps(cone_cosine: float, read: ReadNumber) -> PairGraspSettings:
 
 
 class ParameterisedMethod:
-    """Base of a grasp method whose parameters are read again for every object.
+    """Base class of grasp methods that read their parameters again for every object.
 
     Attributes:
-        declared_in: Package and name of the node, whose file `parameters/NODE.yaml` declares the parameters.
+        declared_in: Package and node name; the parameters are declared in `parameters/NODE.yaml` of the package.
 
     Args:
-        read: Reads a parameter; by default from the parameter server.
+        read: Function that reads a parameter; default: from the parameter server.
     """
 
     declared_in: tuple[str, str]
 
     def __init__(self, read: ReadNumber | None = None) -> None:
-        """Reads nothing yet."""
+        """Stores the reader; parameters are read later."""
         self.read: ReadNumber = read or DeclaredParameters(*self.declared_in).value

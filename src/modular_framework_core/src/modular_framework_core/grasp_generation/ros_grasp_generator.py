@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Watches the planning scene, has a method find grasps for what stands there, and stores them in the grasp manager."""
+"""Node that generates grasps for the objects of the planning scene and stores the grasps in the grasp manager."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ from modular_framework_ros.start_up import start_timeout
 SIGNAL_TOPIC = "grasp_generated"
 SCENE_PERIOD_S = 0.25
 SETTINGS_PERIOD_S = 2.0
-"""Time between two readings of the parameters while the scene is watched [s]: each is two dozen calls of the master."""
+"""Period for reading the parameters while the scene is watched [s]; one reading takes about 24 calls to the master."""
 WAITING_PERIOD_S = 10.0
 WAITING_TASK = "/task/wait_for_start"
-"""Parameter that says whether the task waits until it is asked to start."""
+"""Parameter that is true if the task waits for a start request."""
 
 
 class Kept(Enum):
-    """The grasps of the last generation that a request leaves in the manager, if no object has moved since."""
+    """Grasps of the last generation that a request keeps, if no object has moved since the generation."""
 
-    NONE = "none"
-    LEFT = "those that were not handed out yet, if there are any"
-    COMPLETE = "all, if none was handed out yet"
+    NONE = "no grasps"
+    LEFT = "the remaining grasps, if any"
+    COMPLETE = "all grasps, if none has been taken"
 
 
 SERVICES = {
@@ -67,30 +67,31 @@ SERVICES = {
 
 
 class GraspGenerator:
-    """Generates grasps when an object appears in the crop box or was moved, or on demand.
+    """Generates grasps when an object appears in the crop box or moves, and on request.
 
-    New grasps replace the ones that were generated before. An object that the robot carries counts as the one that
-    is set down under its name.
+    New grasps replace the previous grasps. An object that the robot sets down counts as the object of the same name
+    that was attached before.
 
-    Parameters: see :mod:`ros_generator_settings`, and those of the method; they are read again for every generation,
+    Parameters: see :mod:`ros_generator_settings` and the parameters of the method. They are read for every generation,
         and every 2 s while the scene is watched.
     Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
-        ``component_reports`` (std_msgs/String, JSON: of a generation its time and how many grasps there were).
-    Services (std_srvs/Trigger), the names of every method first, this node's own second:
+        ``component_reports`` (std_msgs/String, JSON: duration and number of grasps of a generation).
+    Services (std_srvs/Trigger):
         ``generate_grasps``, ``~generate``: generates grasps.
-        ``refresh_grasps``, ``~refresh``: waits until the objects rest, and generates grasps if one was moved since;
-            those that are left of the last generation stay otherwise, and new ones are generated if none is left.
-        ``grasp_generated/renew``: the same, and generates grasps if one was handed out since; a task calls it that
-            reads a signal, which may be left from the task before. Waits for an object, at most ``~scene_timeout``.
+        ``refresh_grasps``, ``~refresh``: waits until the objects are at rest, then generates grasps if an object has
+            moved or no grasp of the last generation remains.
+        ``grasp_generated/renew``: like ``refresh_grasps``, and also generates grasps if a grasp has been taken. Waits
+            for an object for at most ``~scene_timeout``. A task calls this service before it reads the signal, because
+            the signal can be from the previous task.
     Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``, ``list_grasps``,
         ``clear_anonymous_grasps``.
 
     Args:
-        method: Finds the grasps of an object.
+        method: Grasp method.
     """
 
     def __init__(self, method: GraspMethod) -> None:
-        """Connects to nothing yet, see :meth:`connect`."""
+        """Creates an unconnected generator; see :meth:`connect`."""
         self._method = method
         self._generated = GeneratedObjects()
         self._scene = SceneObjects()
@@ -99,11 +100,11 @@ class GraspGenerator:
         self._time = SimulatedTime()
 
     def connect(self) -> None:
-        """Measures the gripper and waits for the nodes it needs, at most ``/start_timeout`` for each.
+        """Computes the gripper geometry and waits for the required nodes, at most ``/start_timeout`` for each node.
 
         Raises:
-            NoGraspError: Something needed is missing; the text names it.
-        ParameterError: A parameter is not allowed.
+            NoGraspError: A node or a part of the robot description is missing; the text names it.
+            ParameterError: A parameter is missing or invalid.
         """
         self._reporter = ComponentReporter("generation")
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
@@ -119,24 +120,24 @@ class GraspGenerator:
             raise NoGraspError(str(error)) from error
         if isinstance(self._method, SeeingMethod):
             self._method.connect()
-        # last of all that takes long: who sees the signal's topic expects an answer to a request soon
+        # advertised last, because clients that see this topic expect a fast response of the services
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._services = [
             rospy.Service(name, Trigger, lambda _, kept=kept: self._on_demand(kept)) for name, kept in SERVICES.items()
         ]
 
     def watch(self) -> None:
-        """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
+        """Generates grasps for each new or moved object until ROS shuts down.
 
-        With ``/wait_for_planning`` it generates once, and on request only from then on: what it sees when would depend
-        on the load of the machine. With a task that waits for its start it generates on request only: whoever starts
-        the task asks for grasps first, and a second generation at the same time would slow the one that is measured.
-        What may still arrive is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
-        there yet, a service that does not answer in time on a busy machine.
+        With ``/wait_for_planning``, the node generates once, and afterwards only on request, because the time at which
+        it reads the scene would otherwise depend on the load of the machine. If the task waits for its start, the node
+        generates only on request: the client that starts the task requests grasps first, and a second generation would
+        slow down the measured generation. The node waits at most ``~scene_timeout`` of the ROS clock for a missing
+        object or for a service that does not respond.
         """
         before: list[SceneObject] = []
         on_request = self._time.enabled and bool(rospy.get_param(WAITING_TASK, False))
-        # None: every object that is there has been handled
+        # None: the generation for all present objects is finished
         wait_limit: WaitLimit | None = None if on_request else WaitLimit()
         scene_was_read = False
         settings, settings_read_s = read_settings(), time.monotonic()
@@ -147,7 +148,7 @@ class GraspGenerator:
             try:
                 if wait_limit or time.monotonic() - settings_read_s > SETTINGS_PERIOD_S:
                     settings, settings_read_s = read_settings(), time.monotonic()
-                # a request that comes meanwhile looks at the scene later, and so has the last word
+                # a concurrent request reads the scene later, so its grasps replace the grasps of this reading
                 with self._generating if self._time.enabled else nullcontext():
                     objects = self._scene.targets(settings)
                     self._generated.keep({found.name for found in objects} | self._scene.attached)
@@ -155,12 +156,12 @@ class GraspGenerator:
                     if self._generated.stale(objects):
                         wait_limit = wait_limit or WaitLimit()
                         if at_rest(before, objects):
-                            with self._generating:  # a request may have done it meanwhile
+                            with self._generating:  # a request may have generated the grasps in the meantime
                                 if self._generated.stale(objects):
                                     self._signal_grasps(settings, objects)
                             wait_limit = None
                     before = objects
-            except ParameterError as error:  # a request answers with it
+            except ParameterError as error:  # services return this error in their response
                 rospy.logerr_throttle(WAITING_PERIOD_S, f"{rospy.get_name()} generates no grasps: {error}")
             except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
@@ -174,11 +175,11 @@ class GraspGenerator:
             rospy.rostime.wallsleep(SCENE_PERIOD_S)
 
     def _gives_up(self, error: Exception, wait_limit: WaitLimit, settings: GeneratorSettings) -> bool:
-        """Signals failure once the wait limit is exceeded; logs what is waited for until then."""
+        """Signals failure and returns True if the timeout has elapsed; otherwise logs the cause of the wait."""
         if wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
             self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s of the ROS clock)")
             return True
-        rospy.loginfo_throttle(WAITING_PERIOD_S, f"{rospy.get_name()}: waiting, for {error}.")
+        rospy.loginfo_throttle(WAITING_PERIOD_S, f"{rospy.get_name()}: waiting, because {error}.")
         return False
 
     def _on_demand(self, kept: Kept) -> TriggerResponse:
@@ -196,14 +197,14 @@ class GraspGenerator:
             return TriggerResponse(False, str(error))
 
     def _may_stay(self, objects: list[SceneObject], kept: Kept) -> bool:
-        """Returns whether no object has moved and the manager still has the grasps that a request needs."""
+        """Returns whether no object has moved and the manager still has the grasps that a request keeps."""
         needed = self._stored.count if kept is Kept.COMPLETE else 1
         return not self._generated.stale(objects) and self._stored.left() >= max(1, needed)
 
     def _objects(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
-        """Returns the objects to grasp; for `Kept.NONE` as they are now, else once they rest or that takes too long.
+        """Returns the objects to grasp; waits until they are at rest, at most the timeout, except for `Kept.NONE`.
 
-        For `Kept.COMPLETE` it waits for an object, too.
+        For `Kept.COMPLETE`, the method also waits for an object.
         """
         before: list[SceneObject] = []
         wait_limit = WaitLimit()
@@ -229,11 +230,11 @@ class GraspGenerator:
                 rospy.rostime.wallsleep(SCENE_PERIOD_S)
 
     def _seen(self, settings: GeneratorSettings, error: NoObjectError) -> list[SceneObject]:
-        """Returns the objects that the method sees where the planning scene has none.
+        """Returns the objects that the method detects itself, because the planning scene has none.
 
         Raises:
-            NoObjectError: `error` if the method sees nothing by itself or is asked for a named object; otherwise with
-                why it sees no object.
+            NoObjectError: The method detects no object; or `error`, if the method has no sensors or the settings name
+                an object.
         """
         if settings.object_name or not isinstance(self._method, SeeingMethod):
             raise error
@@ -244,19 +245,20 @@ class GraspGenerator:
             raise NoObjectError(f"{error}; and {unseen}") from unseen
 
     def _signal_grasps(self, settings: GeneratorSettings, objects: list[SceneObject]) -> tuple[bool, str]:
-        """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
+        """Generates grasps, replaces the stored grasps, and signals the result.
 
         Args:
-            settings: The parameters.
-            objects: What to grasp.
+            settings: Parameters of the generator.
+            objects: Objects to grasp.
 
         Returns:
-            What was signalled.
+            Success and text of the signal.
 
         Raises:
-            CallError, CommanderError: Another node does not answer.
+            CallError: A service does not respond.
+            CommanderError: move_group does not respond.
         """
-        # a request by service may come while grasps of a new object are generated
+        # a service request can arrive while grasps of a new object are generated
         with self._generating, self._time.held("grasp generation", during_motions=True):
             with self._reporter.work(rospy.get_name()) as work:
                 try:
@@ -325,8 +327,8 @@ class GraspGenerator:
         if not chosen:
             names = sorted({found.name for found, _ in tried})
             raise NoGraspError(
-                f"no grasp of {names} is reachable: all {len(tried)} that were tried fail, for example "
-                f"because {reasons.most_common(1)[0][0]}"
+                f"no grasp of {names} is reachable: all {len(tried)} checked grasps fail, most often because "
+                f"{reasons.most_common(1)[0][0]}"
             )
         return sorted(chosen, key=lambda message: -message.grasp_quality)
 
@@ -358,15 +360,15 @@ def _sides(found: SceneObject) -> str:
 def run_grasp_generator(name: str, method: GraspMethod) -> int:
     """Runs a grasp generator until ROS shuts down.
 
-    The work has a thread of its own: a signal that met the main thread inside a call to the master would wait for that
-    call's lock, which only the interrupted main thread could give back.
+    The generator runs in a separate thread. In the main thread, a signal during a call to the master would deadlock:
+    the signal handler waits for the lock of the interrupted call.
 
     Args:
         name: Name of the node.
-        method: Finds the grasps.
+        method: Grasp method.
 
     Returns:
-        The exit code: 1 when something the node needs is missing.
+        Exit code: 1 if a required node, parameter or part of the robot description is missing.
     """
     rospy.init_node(name)
     codes: list[int] = []
@@ -376,12 +378,12 @@ def run_grasp_generator(name: str, method: GraspMethod) -> int:
 
 
 def _work(method: GraspMethod, codes: list[int]) -> None:
-    """Generates until ROS shuts down; leaves the exit code in the list and ends the node."""
+    """Generates grasps until ROS shuts down; appends the exit code to the list on failure and ends the node."""
     try:
         generator = GraspGenerator(method)
         generator.connect()
         generator.watch()
-    except Exception as error:  # whatever it is must end the node, which would stay without doing anything
+    except Exception as error:  # any error must end the node; otherwise the node would stay without a function
         if not rospy.is_shutdown():
             codes.append(1)
             rospy.logfatal(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks move_group whether the arm gets to the three poses of a grasp without a collision."""
+"""Checks by inverse kinematics of move_group whether the arm reaches the three poses of a grasp without a collision."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from modular_framework_ros.calls import CallError
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """How the arm gets to a grasp.
+    """Reachability of a grasp.
 
     Attributes:
-        reason: Why it does not; empty when it does.
-        joint_travel: Farthest that a joint moves from one pose of the grasp to the next [rad or m].
+        reason: Reason why the grasp is not reachable; empty if it is reachable.
+        joint_travel: Largest motion of a joint between two consecutive poses of the grasp [rad or m].
     """
 
     reason: str
@@ -27,14 +27,14 @@ class Reach:
 
 
 def check_reach(commander: ArmCommander, grasp: StandardisedGrasp) -> Reach:
-    """Looks for collision-free joint positions at pregrasp, grasp and postgrasp, each near those before it.
+    """Searches collision-free joint positions for pregrasp, grasp and postgrasp; the last solution is the next seed.
 
     Args:
-        commander: The arm; it is connected.
-        grasp: What to reach.
+        commander: Connected commander of the arm.
+        grasp: Grasp to reach.
 
     Raises:
-        CallError: move_group does not answer.
+        CallError: move_group does not respond.
     """
     posture = grasp.pregrasp.posture
     seed = commander.current_joints() | dict(zip(posture.name, posture.position, strict=True))
@@ -47,7 +47,7 @@ def check_reach(commander: ArmCommander, grasp: StandardisedGrasp) -> Reach:
         if not result:
             return Reach(f"at the {stage} pose, {result.reason}")
         if stage == "pregrasp" and (touching := commander.contacts(result.joints)):
-            # the arm arrives there with the fingers as they are now, and takes the posture afterwards
+            # the arm reaches the pregrasp pose with the current finger positions; the fingers move afterwards
             return Reach(f"at the pregrasp pose, with the fingers as they are now, the arm is {touching}")
         travel = max([travel, *(abs(value - joints[name]) for name, value in result.joints.items() if name in joints)])
         joints, seed = result.joints, seed | result.joints

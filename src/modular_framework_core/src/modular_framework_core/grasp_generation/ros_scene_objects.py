@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the objects of move_group's planning scene, and chooses those that are to be grasped."""
+"""Reads the objects of move_group's planning scene, and selects the objects to grasp."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ WARNING_PERIOD_S = 30.0
 
 
 class NoGraspError(RuntimeError):
-    """No grasp can be offered; the text says why."""
+    """No grasp is available; the text is the reason."""
 
 
 class NoObjectError(NoGraspError):
-    """The planning scene was read, and what is to be grasped is not in it."""
+    """The planning scene does not contain an object to grasp."""
 
 
 class SceneObjects:
-    """The objects of the planning scene.
+    """Objects of the planning scene.
 
     Services called: ``get_planning_scene``.
 
     Attributes:
-        attached: Names of the objects that the robot carried when the scene was last read.
+        attached: Names of the attached objects when the scene was last read.
     """
 
     def __init__(self) -> None:
-        """Connects to nothing yet, see :meth:`connect`."""
+        """Creates an unconnected reader; see :meth:`connect`."""
         self.attached: set[str] = set()
         self._known: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
 
@@ -47,17 +47,17 @@ class SceneObjects:
         """Waits for move_group.
 
         Raises:
-            CallError: It is not there in time.
+            CallError: The service does not appear within the timeout.
         """
         self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
         wait_for_service(self._scene, timeout_s)
 
     def targets(self, settings: GeneratorSettings) -> list[SceneObject]:
-        """Returns the objects to grasp: the named one, or all in the crop box.
+        """Returns the objects to grasp: the object named in the settings, or all objects in the crop box.
 
         Raises:
-            NoObjectError: There is none.
-            CallError: move_group does not answer.
+            NoObjectError: The scene contains no such object.
+            CallError: move_group does not respond.
         """
         objects = self.read()
         if settings.object_name:
@@ -78,10 +78,10 @@ class SceneObjects:
         return inside
 
     def read(self) -> list[SceneObject]:
-        """Returns all objects of the scene that the robot does not carry; one that is not understood is left out.
+        """Returns all world objects of the scene; invalid objects are skipped with a warning.
 
         Raises:
-            CallError: move_group does not answer.
+            CallError: move_group does not respond.
         """
         components = PlanningSceneComponents(
             components=PlanningSceneComponents.WORLD_OBJECT_NAMES
@@ -99,7 +99,7 @@ class SceneObjects:
                     found = scene_object(message)
                 known[message.id] = message, found
             except (SceneObjectError, ValueError) as error:
-                rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is left out.")
+                rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is skipped.")
                 continue
             objects += [found] if found is not None else []
         self._known = known

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the grasps of a generator in the grasp manager: new ones take the place of those stored before."""
+"""Stores the grasps of a generator in the grasp manager; new grasps replace the previous grasps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SERVICE_TIMEOUT_S = 10.0
 
 
 class StoredGrasps:
-    """The grasps one generator has stored.
+    """Grasps that this generator has stored in the grasp manager.
 
     Services called: ``add_grasp``, ``remove_grasp``, ``list_grasps``, ``clear_anonymous_grasps``.
     """
@@ -30,10 +30,10 @@ class StoredGrasps:
         self._names: list[str] = []
 
     def connect(self, timeout_s: float) -> None:
-        """Waits for the manager.
+        """Waits for the grasp manager.
 
         Raises:
-            CallError: It is not there in time.
+            CallError: A service does not appear within the timeout.
         """
         self._add = rospy.ServiceProxy("add_grasp", AddStandardisedGrasp)
         self._remove = rospy.ServiceProxy("remove_grasp", RemoveMessage)
@@ -44,27 +44,27 @@ class StoredGrasps:
 
     @property
     def count(self) -> int:
-        """Number of grasps that were stored last."""
+        """Number of grasps of the last generation."""
         return len(self._names)
 
     def left(self) -> int:
-        """Returns how many of them the manager still has.
+        """Returns the number of grasps of the last generation that the manager still has.
 
         Raises:
-            CallError: The manager does not answer.
+            CallError: The manager does not respond.
         """
-        there = call_service(self._list, ListMessagesRequest(), SERVICE_TIMEOUT_S)
-        return len(set(self._names) & set(there.names)) + min(self._names.count(""), there.anonymous)
+        stored = call_service(self._list, ListMessagesRequest(), SERVICE_TIMEOUT_S)
+        return len(set(self._names) & set(stored.names)) + min(self._names.count(""), stored.anonymous)
 
     def replace(self, grasps: list[StandardisedGrasp], prefix: str) -> None:
-        """Stores grasps and removes the earlier ones; anonymous ones of others go with them.
+        """Stores grasps and removes the previous grasps; previous anonymous grasps of all nodes are removed.
 
         Args:
-            grasps: What to store, best first.
-            prefix: They are named ``<prefix>1``, ``<prefix>2``, ...; empty stores them anonymously.
+            grasps: Grasps to store, best first.
+            prefix: Prefix of the names ``<prefix>1``, ``<prefix>2``, ...; empty for anonymous grasps.
 
         Raises:
-            CallError: The manager does not answer.
+            CallError: The manager does not respond.
         """
         names = [f"{prefix}{number}" if prefix else "" for number, _ in enumerate(grasps, start=1)]
         if "" in self._names:

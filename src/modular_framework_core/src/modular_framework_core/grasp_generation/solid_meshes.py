@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the shapes of objects into closed triangle meshes, for methods that cast rays or measure distances."""
+"""Converts the shapes of objects to closed triangle meshes, for methods that cast rays or compute distances."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ Array = npt.NDArray[np.float64]
 
 SIDES = 64
 SPHERE_DIVISIONS = 3
-"""A sphere of 1,280 triangles: their normals are at most 4 degrees off."""
+"""Subdivisions of a sphere: 1,280 triangles, whose normals deviate by at most 4 degrees."""
 
 
 def box(size: Sequence[float]) -> TriangleMesh:
-    """Makes a box around the origin with these lengths along x, y, z [m]."""
+    """Returns a box around the origin with the lengths `size` along x, y, z [m]."""
     return _scaled(_unit("box"), size)
 
 
 def cylinder(height: float, radius: float) -> TriangleMesh:
-    """Makes a cylinder along z around the origin [m]: a prism of 64 sides, inside the round one."""
+    """Returns a cylinder along z around the origin [m], as an inscribed prism with 64 sides."""
     return _scaled(_unit("cylinder"), (radius, radius, height))
 
 
 def cone(height: float, radius: float) -> TriangleMesh:
-    """Makes a cone along z, the middle of its height at the origin, tip up [m]."""
+    """Returns a cone along z with the tip up [m]; the origin is at half the height."""
     return _scaled(_unit("cone"), (radius, radius, height))
 
 
 def sphere(radius: float) -> TriangleMesh:
-    """Makes a sphere around the origin [m]."""
+    """Returns a sphere around the origin [m]."""
     return _scaled(_unit("sphere"), (radius, radius, radius))
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns a closed mesh with its triangles counter-clockwise seen from outside."""
+    """Returns a closed mesh with triangles that are counter-clockwise seen from outside."""
     corners = mesh.vertices[mesh.triangles]
     volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     return mesh if volume >= 0.0 else TriangleMesh(mesh.vertices, mesh.triangles[:, ::-1])
@@ -57,7 +57,7 @@ def moved(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMe
 
 
 def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
-    """Puts meshes into one; solids that overlap stay as they are, each closed in itself."""
+    """Concatenates meshes; overlapping solids are not merged."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return TriangleMesh(
         np.vstack([mesh.vertices for mesh in meshes]),
@@ -71,7 +71,7 @@ def _scaled(mesh: TriangleMesh, factors: Sequence[float]) -> TriangleMesh:
 
 @functools.cache
 def _unit(kind: str) -> TriangleMesh:
-    """Returns a shape of radius or length 1, made once."""
+    """Returns a cached shape of radius or length 1."""
     import trimesh  # slow to load
 
     match kind:

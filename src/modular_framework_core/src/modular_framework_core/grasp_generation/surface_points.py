@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns shapes into points on their surfaces, so that the search for grasps is the same for every shape."""
+"""Samples points on the surfaces of shapes, so that one grasp search handles all shapes."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Surface:
     """Points on a surface.
 
     Attributes:
-        points: (n, 3) positions [m].
-        normals: (n, 3) outward unit normals.
+        points: Positions, shape (n, 3) [m].
+        normals: Outward unit normals, shape (n, 3).
         volume: Enclosed volume [m^3].
-        centroid: (3,) centre of that volume [m].
-        axes: (k, 3) unit directions along which the shape has flat or parallel sides.
+        centroid: Centre of the volume, shape (3,) [m].
+        axes: Unit vectors along the symmetry or principal axes of the shape, shape (k, 3).
     """
 
     points: Array
@@ -35,7 +35,7 @@ class Surface:
     axes: Array
 
     def moved(self, rotation: Array, translation: Array) -> Surface:
-        """Returns the surface after a rotation (3, 3) and a translation (3,) [m]."""
+        """Returns the surface after a rotation, shape (3, 3), and a translation, shape (3,) [m]."""
         return Surface(
             self.points @ rotation.T + translation,
             self.normals @ rotation.T,
@@ -73,7 +73,7 @@ def box(size: Sequence[float]) -> Surface:
 
 
 def cylinder(height: float, radius: float, top_radius: float | None = None) -> Surface:
-    """Samples a cylinder along z around the origin, or a cone when the top radius differs.
+    """Samples a cylinder along z around the origin, or a cone if the top radius differs.
 
     Args:
         height: Length along z [m].
@@ -122,8 +122,8 @@ def mesh(vertices: Array, triangles: npt.NDArray[np.int64]) -> Surface:
     """Samples a triangle mesh.
 
     Args:
-        vertices: (n, 3) [m].
-        triangles: (m, 3) indices, counter-clockwise seen from outside.
+        vertices: Vertices, shape (n, 3) [m].
+        triangles: Vertex indices, counter-clockwise seen from outside, shape (m, 3).
     """
     corners = vertices[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
