@@ -153,7 +153,7 @@ def test_a_gripper_that_loses_its_power_as_it_closes_ends_the_task_and_the_arm_d
     log = framework.log()
     assert "Task 'pick_and_hold' ended with outcome 'successful_pipeline'" not in log, log
     assert "EzGripper: servo 1 on" in log and "does not respond" in log, log
-    assert "stopped on something" not in log, log
+    assert "stopped at an object" not in log, log
     emulators.stop()
     with path_log.open() as file:
         after = [[float(value) for value in row[8:14]] for row in list(csv.reader(file))[1:] if float(row[0]) > cut_s]

@@ -82,18 +82,18 @@ def test_a_posture_that_does_not_fit_the_hand_is_refused(names: list[str], posit
         posture_targets(names, positions, HAND)
 
 
-def test_effort_is_the_share_of_what_the_joint_can_do() -> None:
+def test_effort_is_a_fraction_of_the_effort_limit() -> None:
     assert effort_limits({"f": 1.0}, {"f": -0.5}, HAND, 0.5, Stage.PREGRASP) == {"f": pytest.approx(0.5)}
     assert effort_limits({"f": 1.0}, {}, HAND, 1.0, Stage.GRASP) == {"f": 2.0}
 
 
-def test_no_torque_is_not_taken_for_the_torque_of_the_controller() -> None:
+def test_no_torque_differs_from_the_default_torque_of_the_controller() -> None:
     arm = read_group(URDF, SRDF, "arm")
     assert effort_limits({"f": 1.0}, {"f": 0.0}, HAND, 1.0, Stage.GRASP) == {"f": 0.0}
     assert effort_limits({"a": 1.0}, {}, arm, 0.5, Stage.GRASP) == {"a": 5.0}
     assert effort_limits({"b": 1.0}, {}, arm, 0.5, Stage.GRASP) == {}
     assert effort_limits({"b": 1.0}, {"b": 0.0}, arm, 0.5, Stage.GRASP) == {"b": 0.0}
-    with pytest.raises(GraspCommandError, match="joint 'f' is to move with no torque, allowed is more than 0"):
+    with pytest.raises(GraspCommandError, match="joint 'f' has an effort limit of 0"):
         refuse_no_effort("f", 0.0)
 
 
@@ -102,13 +102,13 @@ def test_no_torque_for_a_posture_is_the_torque_of_the_controller(stage: Stage) -
     assert effort_limits({"f": 1.0}, {"f": 0.0}, HAND, 1.0, stage) == {}
 
 
-def test_the_greatest_torque_is_a_share_of_the_full_one() -> None:
+def test_the_maximum_torque_is_a_fraction_of_the_full_torque() -> None:
     assert (torque_share(400.0, 800.0), torque_share(900.0, 800.0)) == (0.5, 1.0)
 
 
 @pytest.mark.parametrize("torque", [0.0, -1.0, float("nan"), float("inf"), float("-inf")])
-def test_a_greatest_torque_that_is_no_positive_number_is_refused(torque: float) -> None:
-    with pytest.raises(GraspCommandError, match=f"max_torque is {torque}, allowed are numbers of more than 0"):
+def test_a_maximum_torque_that_is_not_positive_is_refused(torque: float) -> None:
+    with pytest.raises(GraspCommandError, match=f"max_torque is {torque}; allowed: numbers above 0"):
         torque_share(torque, 800.0)
 
 
@@ -119,14 +119,12 @@ def test_a_greatest_torque_that_is_no_positive_number_is_refused(torque: float) 
         ([], [1.0], "0 joint names and 1 values"),
         (["f", "f"], [1.0, 1.0], "twice"),
         (["x"], [1.0], "no active joint"),
-        (["f"], [1.5], "is 1.5, allowed is -1 to 1"),
-        (["f"], [float("nan")], "is nan, allowed is -1 to 1"),
+        (["f"], [1.5], "is 1.5; allowed: -1 to 1"),
+        (["f"], [float("nan")], "is nan; allowed: -1 to 1"),
         (["f"], [float("inf")], "is inf"),
     ],
 )
-def test_torque_intensities_that_do_not_fit_the_hand_are_refused(
-    names: list[str], values: list[float], hint: str
-) -> None:
+def test_invalid_torque_intensities_are_refused(names: list[str], values: list[float], hint: str) -> None:
     with pytest.raises(GraspCommandError, match=hint):
         torque_intensities(names, values, HAND)
 
@@ -213,9 +211,9 @@ def test_of_several_joints_one_that_is_short_of_its_target_must_have_moved() -> 
         (Stage.PREGRASP, 0.5, 0.51, False, True, "reached"),
         (Stage.PREGRASP, 0.0, 0.4, False, False, "'f' is 0.4"),
         (Stage.PREGRASP, 0.5, 0.9, True, False, "away"),
-        (Stage.GRASP, 1.94, 1.2, True, True, "stopped on something"),
-        (Stage.GRASP, 1.94, 1.93, False, False, "without anything"),
-        (Stage.GRASP, 1.94, 1.92, True, False, "without anything"),
+        (Stage.GRASP, 1.94, 1.2, True, True, "stopped at an object"),
+        (Stage.GRASP, 1.94, 1.93, False, False, "without an object"),
+        (Stage.GRASP, 1.94, 1.92, True, False, "without an object"),
         (Stage.GRASP, 1.2, 1.21, False, True, "reached"),
         (Stage.GRASP, 1.94, 1.2, False, False, "away"),
         (Stage.POSTGRASP, 1.94, 1.2, True, True, "still"),

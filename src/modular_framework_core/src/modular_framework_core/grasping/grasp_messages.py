@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Builds the messages a grasp is made of, so that methods need not know their layout."""
+"""Builds grasp messages, so that grasp methods are independent of the message layout."""
 
 from __future__ import annotations
 
@@ -20,17 +20,14 @@ def generate_joint_state_message(
     effort: Sequence[float] = (),
     reference_frame_name: str = "world",
 ) -> JointState:
-    """Makes a joint state stamped now.
+    """Returns a joint state message with the current time.
 
     Args:
-        joint_names: Joints.
-        position: Their positions [rad or m].
-        velocity: Their velocities [rad/s or m/s]; may be empty.
-        effort: Their efforts [N m or N]; may be empty.
+        joint_names: Joint names.
+        position: Joint positions [rad or m].
+        velocity: Joint velocities [rad/s or m/s]; may be empty.
+        effort: Joint efforts [Nm or N]; may be empty.
         reference_frame_name: Frame of the header.
-
-    Returns:
-        The message.
     """
     state = JointState(name=list(joint_names), position=list(position), velocity=list(velocity), effort=list(effort))
     state.header.stamp, state.header.frame_id = rospy.Time.now(), reference_frame_name
@@ -40,23 +37,20 @@ def generate_joint_state_message(
 def generate_pose_stamped_message(
     reference_frame_name: str, position: Sequence[float], orientation: Sequence[float]
 ) -> PoseStamped:
-    """Makes a pose stamped now.
+    """Returns a stamped pose with the current time.
 
     Args:
-        reference_frame_name: Frame the pose is given in.
+        reference_frame_name: Frame of the pose.
         position: x, y, z [m].
         orientation: Roll, pitch, yaw [rad], or a quaternion x, y, z, w.
 
-    Returns:
-        The message.
-
     Raises:
-        ValueError: The position has not three values, or the orientation neither three nor four.
+        ValueError: The position does not have three values, or the orientation does not have three or four values.
     """
     if len(position) != 3 or len(orientation) not in (3, 4):
         raise ValueError(
-            "a pose needs 3 values of position and 3 (roll, pitch, yaw) or 4 (x, y, z, w) of "
-            f"orientation, got {len(position)} and {len(orientation)}"
+            "a pose needs 3 position values and 3 (roll, pitch, yaw) or 4 (x, y, z, w) orientation values; "
+            f"got {len(position)} and {len(orientation)}"
         )
     quaternion = tuple(orientation) if len(orientation) == 4 else quaternion_from_rpy(*orientation)
     message = PoseStamped()
@@ -79,24 +73,21 @@ def get_standardised_grasp(  # noqa: PLR0913, PLR0917 - the original framework's
     hand_id: str = "",
     object_id: str = "",
 ) -> StandardisedGrasp:
-    """Makes a grasp message; the three postures are stamped now.
+    """Returns a grasp message whose postures have the current time.
 
     Args:
         manipulator_joint_names: Joints of the manipulator, for the postures and the torques.
-        pregrasp_joint_values: Positions before the grasp [rad or m].
-        grasp_joint_values: Positions that grasp [rad or m].
-        postgrasp_joint_values: Positions after the grasp [rad or m].
-        torque_intensity: Share of the greatest torque of each joint, in [-1, 1].
+        pregrasp_joint_values: Joint positions before the grasp [rad or m].
+        grasp_joint_values: Joint positions of the grasp [rad or m].
+        postgrasp_joint_values: Joint positions after the grasp [rad or m].
+        torque_intensity: Fraction of the maximum torque of each joint, in [-1, 1].
         pregrasp_pose: Pose of the hand before the grasp.
         grasp_pose: Pose of the hand at the grasp.
         postgrasp_pose: Pose of the hand after the grasp.
-        grasp_quality: Rank; more is better.
+        grasp_quality: Quality of the grasp; higher is better.
         grasp_id: Name of the grasp.
         hand_id: Name of the hand.
         object_id: Name of the object.
-
-    Returns:
-        The message.
     """
     stages = [
         ManipulatorState(generate_joint_state_message(manipulator_joint_names, values, (), (), ""), pose)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks a grasp command for the manipulator, and decides whether the manipulator reached it."""
+"""Checks grasp commands for the manipulator, and decides whether the manipulator reached a stage."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from enum import IntEnum
 from modular_framework_core.commander.robot_groups import Group, RobotModelError
 
 CLOSED_STATE = "closed"
-TOLERANCE_SHARE, WIDEST_TOLERANCE = 0.025, 0.05
-"""Distance that counts as reached: a share of the smallest range of the fingers' joints, and the most [rad or m]."""
+TOLERANCE_FRACTION, MAX_TOLERANCE = 0.025, 0.05
+"""Default position tolerance as a fraction of the smallest range of a finger joint, and its maximum [rad or m]."""
 
 
 class GraspCommandError(ValueError):
-    """A grasp command cannot be carried out; the text says why and what is allowed."""
+    """A grasp command cannot be executed; the text contains the reason and the allowed values."""
 
 
 class Stage(IntEnum):
-    """Stage of a grasp, with the numbers of modular_framework_core/GraspCommand."""
+    """Stage of a grasp; the values are the constants of modular_framework_core/GraspCommand."""
 
     PREGRASP = 0
     GRASP = 1
@@ -28,28 +28,28 @@ class Stage(IntEnum):
 
     @classmethod
     def of(cls, number: int) -> Stage:
-        """Returns the stage of a number.
+        """Returns the stage for a value of `grasp_state`.
 
         Raises:
-            GraspCommandError: There is no such stage.
+            GraspCommandError: The value is not a stage.
         """
         try:
             return cls(number)
         except ValueError as error:
             raise GraspCommandError(
-                f"grasp_state is {number}, allowed are PRE_GRASP_STATE=0, GRASP_STATE=1, POST_GRASP_STATE=2"
+                f"grasp_state is {number}; allowed: PRE_GRASP_STATE=0, GRASP_STATE=1, POST_GRASP_STATE=2"
             ) from error
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Final positions of the fingers, and how the motion ended.
+    """Result of a motion of the fingers.
 
     Attributes:
-        positions: {joint: position} after the motion [rad or m].
-        stalled: True when something stopped the fingers before they got to their targets.
+        positions: Joint positions after the motion, by name [rad or m].
+        stalled: Whether the fingers stopped before they reached their targets.
         text: Message of the controller.
-        pressing: True when they press with an effort that moves free fingers.
+        pressing: Whether the fingers press with an effort that would move free fingers.
     """
 
     positions: Mapping[str, float]
@@ -60,7 +60,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a stage was reached, and the reason."""
+    """Decision whether a stage was reached, with the reason."""
 
     reached: bool
     reason: str
@@ -71,36 +71,36 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
 
     Args:
         names: Joints of the posture.
-        positions: Their positions [rad or m].
+        positions: Joint positions [rad or m].
         group: Planning group of the manipulator.
 
     Returns:
-        {joint: position}.
+        Joint positions by name.
 
     Raises:
-        GraspCommandError: Names and positions do not pair, a joint is foreign or repeated, or a position is out of
-            limits.
+        GraspCommandError: The numbers of names and positions differ, a joint is repeated or not in the group, or a
+            position is outside the joint limits.
     """
     if not names:
-        raise GraspCommandError("the posture has no joint names; it needs at least one, with its position")
+        raise GraspCommandError("the posture has no joint names; give at least one joint with its position")
     targets = _paired("the posture", names, "positions", positions, group)
     for name, position in targets.items():
         joint = group.joint(name)
         if not math.isfinite(position) or not joint.lower - 1e-6 <= position <= joint.upper + 1e-6:
             raise GraspCommandError(
-                f"joint '{name}' is to go to {position}, its limits are [{joint.lower}, {joint.upper}]"
+                f"joint '{name}': the target is {position}; allowed: {joint.lower} to {joint.upper}"
             )
     return targets
 
 
 def _paired(what: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
-    """Pairs joints of the group with their values; ``what`` and ``kind`` say in errors of what."""
+    """Returns values by joint name; errors name the message part `what` and the kind of values."""
     if len(names) != len(values):
         raise GraspCommandError(
-            f"{what} has {len(names)} joint names and {len(values)} {kind}; it needs as many of each"
+            f"{what} has {len(names)} joint names and {len(values)} {kind}; the numbers must be equal"
         )
     if len(set(names)) != len(names):
-        raise GraspCommandError(f"{what} names a joint twice: {list(names)}; name each once")
+        raise GraspCommandError(f"{what} contains a joint twice: {list(names)}; list each joint once")
     for name in names:
         try:
             group.joint(name)
@@ -110,19 +110,18 @@ def _paired(what: str, names: Sequence[str], kind: str, values: Sequence[float],
 
 
 def torque_share(max_torque: float, full_scale: float) -> float:
-    """Computes a command's greatest torque as a share of what the joints can do; more than they can do is 1.
+    """Returns the maximum torque of a command as a fraction of the effort limits, clipped to 1.
 
     Args:
-        max_torque: Of the command, in the unit of ``full_scale``.
-        full_scale: Value that stands for the joints' full effort, more than 0.
+        max_torque: Maximum torque of the command, in the unit of ``full_scale``.
+        full_scale: Value that corresponds to the effort limits; above 0.
 
     Raises:
-        GraspCommandError: The torque is no positive number.
+        GraspCommandError: The torque is not a positive number.
     """
     if not 0.0 < max_torque < math.inf:
         raise GraspCommandError(
-            f"max_torque is {max_torque}, allowed are numbers of more than 0 ({full_scale:g} is "
-            "the full torque); set how hard the fingers may press"
+            f"max_torque is {max_torque}; allowed: numbers above 0 ({full_scale:g} is the full torque)"
         )
     return min(1.0, max_torque / full_scale)
 
@@ -131,44 +130,46 @@ def torque_intensities(names: Sequence[str], values: Sequence[float], group: Gro
     """Checks the torque intensities of a grasp against the manipulator's planning group.
 
     Args:
-        names: Joints.
-        values: Their intensities in [-1, 1]; negative means outward. None at all leaves every joint at full intensity.
+        names: Joint names.
+        values: Torque intensities in [-1, 1]; negative values are outward. An empty sequence stands for full intensity
+            of all joints.
         group: Planning group of the manipulator.
 
     Returns:
-        {joint: intensity}.
+        Torque intensities by joint name.
 
     Raises:
-        GraspCommandError: As for a posture; the range of an intensity is [-1, 1].
+        GraspCommandError: The numbers of names and values differ, a joint is repeated or not in the group, or an
+            intensity is outside [-1, 1].
     """
     if not values:
         return {}
     intensities = _paired("torque_intensity", names, "values", values, group)
     for name, value in intensities.items():
         if not -1.0 <= value <= 1.0:
-            raise GraspCommandError(f"the torque intensity of joint '{name}' is {value}, allowed is -1 to 1")
+            raise GraspCommandError(f"the torque intensity of joint '{name}' is {value}; allowed: -1 to 1")
     return intensities
 
 
 def effort_limits(
     targets: Mapping[str, float], intensities: Mapping[str, float], group: Group, share: float, stage: Stage
 ) -> dict[str, float]:
-    """Computes the effort each joint may use.
+    """Computes the effort limit of each joint.
 
-    The effort is |torque intensity| x share of the greatest torque x the joint's effort limit in the URDF. A joint
-    without an intensity counts as 1. An intensity of 0 is no effort where the fingers are to close on an object; where
-    they only take a posture, it leaves theirs to the controller.
+    The effort limit is |torque intensity| x `share` x effort limit of the joint in the URDF. The default intensity is
+    1. At the stage `grasp`, an intensity of 0 means no effort. At the other stages, the controller then chooses the
+    effort.
 
     Args:
         targets: Joints to move.
-        intensities: {joint: intensity in [-1, 1]}.
+        intensities: Torque intensities in [-1, 1], by joint name.
         group: Planning group of the manipulator.
-        share: Greatest torque as a share of what the joints can do, in (0, 1].
-        stage: Stage that is commanded.
+        share: Maximum torque as a fraction of the effort limits, in (0, 1].
+        stage: Commanded stage.
 
     Returns:
-        {joint: effort} [N m or N]; without the joints whose effort is left to the controller: those with an intensity
-        of 0 outside the grasp, and those whose effort the URDF does not limit.
+        Effort limits by joint name [Nm or N]. Joints whose effort the controller chooses are missing: joints without an
+        effort limit in the URDF, and joints with an intensity of 0 outside the stage `grasp`.
     """
     limits: dict[str, float] = {}
     for name in targets:
@@ -182,27 +183,27 @@ def effort_limits(
 
 
 def refuse_no_effort(name: str, effort: float) -> None:
-    """Refuses to move a joint that may not use any effort, for those that bound it.
+    """Raises an error for a joint without effort; for drivers that limit the effort.
 
     Raises:
         GraspCommandError: The effort is 0.
     """
     if effort == 0.0:
         raise GraspCommandError(
-            f"joint '{name}' is to move with no torque, allowed is more than 0 (max_torque x its "
-            "torque intensity, which is 0 or too small); give the grasp more of either"
+            f"joint '{name}' has an effort limit of 0 (max_torque x torque intensity); "
+            "allowed: more than 0; increase max_torque or the torque intensity"
         )
 
 
 def closed_positions(group: Group) -> dict[str, float]:
-    """Returns where the joints are when the hand is shut: the group state ``closed``, else the upper limits."""
+    """Returns the joint positions of the closed hand: the group state ``closed``, or else the upper limits."""
     return group.states.get(CLOSED_STATE) or {joint.name: joint.upper for joint in group.joints}
 
 
 def reached_tolerance(group: Group) -> float:
-    """Returns the distance that counts as reached [rad or m]: a small share of the fingers' range of motion."""
+    """Returns the default position tolerance [rad or m]: a small fraction of the fingers' range of motion."""
     ranges = [joint.upper - joint.lower for joint in group.joints if 0.0 < joint.upper - joint.lower < math.inf]
-    return min([WIDEST_TOLERANCE, *(TOLERANCE_SHARE * each for each in ranges)])
+    return min([MAX_TOLERANCE, *(TOLERANCE_FRACTION * each for each in ranges)])
 
 
 def judge(
@@ -210,19 +211,17 @@ def judge(
 ) -> Verdict:
     """Decides whether a stage was reached.
 
-    pregrasp: every joint is at its target. grasp: something stopped the fingers, or they are at targets short of a
-    shut hand; a hand that shuts fully holds nothing. postgrasp: every joint is at its target, or the object still
-    stops them.
+    - `pregrasp` is reached if all joints are at their targets.
+    - `grasp` is reached if the fingers stalled, or if all joints are at targets of a hand that is not closed. A fully
+      closed hand holds no object.
+    - `postgrasp` is reached if all joints are at their targets, or if the object still blocks the fingers.
 
     Args:
-        stage: Stage that was commanded.
-        targets: {joint: position} commanded.
-        outcome: What happened.
-        closed: {joint: position} of the shut hand.
-        tolerance: Greatest distance that counts as reached [rad or m].
-
-    Returns:
-        The verdict.
+        stage: Commanded stage.
+        targets: Commanded positions by joint name [rad or m].
+        outcome: Result of the motion.
+        closed: Joint positions of the closed hand, by name [rad or m].
+        tolerance: Position tolerance [rad or m].
     """
     away = {name: abs(outcome.positions.get(name, math.inf) - target) for name, target in targets.items()}
     worst = max(away, key=away.__getitem__)
@@ -231,17 +230,17 @@ def judge(
         abs(outcome.positions.get(name, math.inf) - closed[name]) <= tolerance for name in targets if name in closed
     )
     missed = (
-        f"joint '{worst}' is {away[worst]:.4f} away from its target {targets[worst]:.4f}, allowed is {tolerance}"
+        f"joint '{worst}' is {away[worst]:.4f} away from its target {targets[worst]:.4f}; tolerance: {tolerance}"
         f"{'; ' + outcome.text if outcome.text else ''}"
     )
     match stage:
         case Stage.PREGRASP:
             return Verdict(reached, "posture reached" if reached else missed)
         case Stage.GRASP if shut and any(name in closed for name in targets):
-            return Verdict(False, "the fingers closed fully without anything between them")
+            return Verdict(False, "the fingers closed fully without an object between them")
         case Stage.GRASP if outcome.stalled:
-            return Verdict(True, "the fingers stopped on something before they were shut")
+            return Verdict(True, "the fingers stopped at an object before they were closed")
         case Stage.POSTGRASP if outcome.stalled and not reached:
-            return Verdict(not shut, "the fingers are still stopped by something" if not shut else missed)
+            return Verdict(not shut, "an object still blocks the fingers" if not shut else missed)
         case _:
             return Verdict(reached, "posture reached" if reached else missed)

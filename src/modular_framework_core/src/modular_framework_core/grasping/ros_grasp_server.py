@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves the Grasp action: moves the manipulator to the stages of a grasp and reports where the fingers ended."""
+"""Server of the Grasp action: moves the manipulator to the stages of a grasp and reports the result."""
 
 from __future__ import annotations
 
@@ -41,15 +41,16 @@ STAGE_FIELDS = {
 
 
 class GraspServer:
-    """Action server of modular_framework_core/Grasp. A new goal replaces the current one; a cancel stops the fingers.
+    """Action server of modular_framework_core/Grasp. A new goal replaces the current goal; a cancel stops the fingers.
 
-    Only ``posture`` of the commanded stage moves anything here: the arm brings the hand to ``pose``.
+    The server moves the fingers to ``posture`` of the commanded stage. It ignores ``pose``, which is a target of the
+    arm.
 
     Parameters: see ``parameters/grasp_server.yaml``.
 
     Args:
-        group: The joints of the fingers and their limits.
-        manipulator: What moves them.
+        group: Planning group of the fingers.
+        manipulator: Driver of the fingers.
     """
 
     def __init__(self, group: Group, manipulator: Manipulator) -> None:
@@ -65,7 +66,7 @@ class GraspServer:
         self._last_s = 0.0
 
     def connect(self, action_name: str) -> None:
-        """Connects the manipulator and offers the action."""
+        """Connects the manipulator and starts the action server."""
         self._manipulator.connect()
         self._server = SteadyActionServer(action_name, GraspAction, self._on_goal, self._goals.cancel, auto_start=False)
         self._server.start()
@@ -109,11 +110,11 @@ class GraspServer:
         intensities = torque_intensities(torque.joint_names, torque.torque_intensity, self._group)
         share = torque_share(command.max_torque, self._full_scale)
         if stop.is_set():
-            raise GraspCommandError("stopped on request, before anything moved")
+            raise GraspCommandError("stopped on request, before the motion")
         efforts = effort_limits(targets, intensities, self._group, share, stage)
         motion = Motion(targets, efforts, self._timeout_s, stop.is_set)
         now_s = rospy.get_time()
-        if now_s < self._last_s:  # a simulation that begins again: what was seen of the fingers before does not count
+        if now_s < self._last_s:  # reset of the simulation: discard the evidence of earlier motions
             self._evidence = StallEvidence(self._tolerance)
         self._last_s = now_s
         begun = self._manipulator.joint_state(targets)
@@ -126,7 +127,7 @@ class GraspServer:
 
         def publish() -> None:
             while not ended.wait(FEEDBACK_PERIOD_S):
-                with suppress(CallError):  # the next one is soon
+                with suppress(CallError):  # the next feedback follows soon
                     handle.publish_feedback(
                         GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets))
                     )
@@ -142,7 +143,7 @@ def read_manipulator() -> Group:
     """Reads the manipulator's planning group from the parameter server.
 
     Raises:
-        RobotModelError: A parameter is not set, or the group has no active joint.
+        RobotModelError: A parameter is missing, or the group has no active joint.
     """
     names = ("manipulator_group_name", "robot_description", "robot_description_semantic")
     wait_for_start(lambda: all(rospy.has_param(name) for name in names), f"the parameters {', '.join(names)}")
@@ -155,7 +156,7 @@ def read_manipulator() -> Group:
     name, urdf, srdf = (str(rospy.get_param(parameter)) for parameter in names)
     group = read_group(urdf, srdf, name)
     if not group.joints:
-        raise RobotModelError(f"planning group '{name}' has no active joint; name the fingers' group")
+        raise RobotModelError(f"planning group '{name}' has no active joint; use the planning group of the fingers")
     return group
 
 
@@ -163,7 +164,7 @@ def read_controllers() -> list[dict[str, Any]]:
     """Reads the controllers from ``~controller_list`` or ``/move_group/controller_list``.
 
     Raises:
-        RobotModelError: Neither is set.
+        RobotModelError: No such parameter is set.
     """
     names = ("~controller_list", "/move_group/controller_list", "controller_list")
     wait_for_start(lambda: any(rospy.has_param(name) for name in names), f"one of the parameters {', '.join(names)}")
@@ -177,11 +178,11 @@ def read_controllers() -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Runs the node ``moveit_grasp_action_server``; returns 1 when the robot's side is incomplete.
+    """Runs the node ``moveit_grasp_action_server``; returns 1 if the description of the manipulator is incomplete.
 
     Parameters: see ``parameters/moveit_grasp_action_server.yaml``.
 
-    Subscribers: ``joint_states``. Actions called: the controller's own.
+    Subscribers: ``joint_states``. Actions called: the action of the controller.
     """
     rospy.init_node("moveit_grasp_action_server")
     read = DeclaredParameters("modular_framework_core", "moveit_grasp_action_server").values
@@ -192,6 +193,6 @@ def main() -> int:
         rospy.logfatal("moveit_grasp_action_server: %s", error)
         return 1
     server.connect(name)
-    rospy.loginfo("The manipulator listens to action '%s'.", rospy.resolve_name(name))
+    rospy.loginfo("The action server '%s' of the manipulator is ready.", rospy.resolve_name(name))
     rospy.spin()
     return 0

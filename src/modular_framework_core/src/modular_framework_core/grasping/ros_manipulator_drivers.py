@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drivers that move the manipulator for the grasp server.
-
-They use its ROS controller, with either kind of action, or a device's own driver.
-"""
+"""Drivers that move the manipulator for the grasp server, through the action of a ROS controller."""
 
 from __future__ import annotations
 
@@ -31,18 +28,18 @@ STALL_ERROR_CODES = (
     FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
     FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
 )
-"""Result codes of a trajectory whose joints are blocked; any other result is no stall."""
+"""Result codes of a trajectory with blocked joints; other result codes are not stalls."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """One motion of the fingers.
+    """Motion of the fingers.
 
     Attributes:
-        targets: {joint: position} [rad or m].
-        efforts: {joint: greatest effort} [N m or N]; one that is missing is the controller's own.
-        timeout_s: Longest time the motion may take [s, wall time].
-        stop_requested: Asked all the time; True stops the fingers.
+        targets: Target positions by joint name [rad or m].
+        efforts: Effort limits by joint name [Nm or N]; for other joints, the controller chooses the effort.
+        timeout_s: Timeout of the motion [s, wall time].
+        stop_requested: Function polled during the motion; True stops the fingers.
     """
 
     targets: dict[str, float]
@@ -52,14 +49,14 @@ class Motion:
 
 
 class ManipulatorDriver(Protocol):
-    """One kind of controller."""
+    """Driver of one type of controller."""
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
-        """Moves the fingers and waits for the end."""
+        """Moves the fingers and waits for the end of the motion."""
 
 
 class GripperDriver:
-    """Drives a controller with one joint through control_msgs/GripperCommand.
+    """Driver of a controller with one joint and the action control_msgs/GripperCommand.
 
     Args:
         action: Name of the action.
@@ -73,13 +70,13 @@ class GripperDriver:
         """Moves the joint; a stall is an outcome, not an error.
 
         Raises:
-            CallError: The controller is not there.
-            GraspCommandError: There is more than one joint, it may use no effort, or the controller neither reached the
-                target nor stalled.
+            CallError: The action server is missing.
+            GraspCommandError: The motion has more than one joint, the effort limit is 0, or the controller neither
+                reached the target nor stalled.
         """
         if len(motion.targets) != 1:
             raise GraspCommandError(
-                f"controller action '{self._action}' moves one joint, the posture has {sorted(motion.targets)}"
+                f"controller action '{self._action}' moves a single joint; the posture has {sorted(motion.targets)}"
             )
         ((name, position),) = motion.targets.items()
         if name in motion.efforts:
@@ -102,11 +99,11 @@ class GripperDriver:
 
 
 class TrajectoryDriver:
-    """Drives a controller through control_msgs/FollowJointTrajectory.
+    """Driver of a controller with the action control_msgs/FollowJointTrajectory.
 
     Args:
         action: Name of the action.
-        duration_s: Time given to the fingers for a motion [s].
+        duration_s: Duration of a motion [s].
     """
 
     def __init__(self, action: str, duration_s: float) -> None:
@@ -114,11 +111,11 @@ class TrajectoryDriver:
         self._client = SteadyActionClient(action, FollowJointTrajectoryAction)
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
-        """Moves the joints; fingers that rest out of the controller's tolerances are stalled.
+        """Moves the joints; fingers at rest outside the controller's tolerances are stalled.
 
         Raises:
-            CallError: The controller is not there.
-            GraspCommandError: The controller refused the motion, gave it up for another reason, or did not end it.
+            CallError: The action server is missing.
+            GraspCommandError: The controller rejected the goal, aborted it for another reason, or exceeded the timeout.
         """
         wait_for_action(self._client, self._action, 10.0)
         goal = FollowJointTrajectoryGoal()
@@ -142,18 +139,15 @@ class TrajectoryDriver:
 
 
 def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:
-    """Chooses the controller that has all joints of a posture.
+    """Returns a driver of the controller that has all joints of a posture.
 
     Args:
         controllers: Entries of ``controller_list``: name, action_ns, type, joints.
         joints: Joints to move.
-        duration_s: Time given to a motion of a trajectory controller [s].
-
-    Returns:
-        A driver of that controller.
+        duration_s: Duration of a motion of a trajectory controller [s].
 
     Raises:
-        GraspCommandError: No controller has all the joints, or its type is unknown.
+        GraspCommandError: No controller has all joints, or the controller type is unknown.
     """
     known = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
     for entry in controllers:
@@ -166,41 +160,41 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
                     return TrajectoryDriver(action, duration_s)
                 case other:
                     raise GraspCommandError(
-                        f"controller '{entry.get('name')}' has the type '{other}', allowed are "
-                        "GripperCommand and FollowJointTrajectory"
+                        f"controller '{entry.get('name')}' has the type '{other}'; allowed: "
+                        "GripperCommand, FollowJointTrajectory"
                     )
-    raise GraspCommandError(f"no controller has all the joints {sorted(joints)}; controller_list has {known}")
+    raise GraspCommandError(f"no controller has all joints {sorted(joints)}; controller_list has {known}")
 
 
 class Manipulator(Protocol):
-    """Moves the fingers and knows their positions."""
+    """Moves the fingers and reads their positions."""
 
     def connect(self) -> None:
-        """Starts to receive joint positions."""
+        """Subscribes to the joint positions."""
 
     def move(self, motion: Motion) -> Outcome:
-        """Moves the fingers and waits for the end.
+        """Moves the fingers and waits for the end of the motion.
 
         Raises:
-            GraspCommandError: It could not be done, or was stopped; the text says why.
-            CallError: Another node did not answer.
+            GraspCommandError: The motion failed or was stopped; the text is the reason.
+            CallError: Another node did not respond.
         """
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
-        """Makes a message of where these joints are now."""
+        """Returns a message with the current positions of the joints."""
 
 
 class ControlledManipulator:
-    """A manipulator with a ROS controller.
+    """Manipulator with a ROS controller.
 
     Args:
         controllers: Entries of ``controller_list``: name, action_ns, type, joints.
-        duration_s: Time given to a motion of a trajectory controller [s].
+        duration_s: Duration of a motion of a trajectory controller [s].
     """
 
     def __init__(self, controllers: list[dict[str, Any]], duration_s: float) -> None:
         self._controllers, self._duration_s = controllers, duration_s
-        self._monitor = JointMonitor(queue_size=1)  # rest counts from the end of the goal
+        self._monitor = JointMonitor(queue_size=1)  # rest is detected after the end of the goal
         self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
 
     def connect(self) -> None:
@@ -208,14 +202,14 @@ class ControlledManipulator:
         self._monitor.connect()
 
     def move(self, motion: Motion) -> Outcome:
-        """Moves the joints through the controller that has them all."""
+        """Moves the joints through the controller that has all of them."""
         key = tuple(sorted(motion.targets))
         if key not in self._drivers:
             self._drivers[key] = make_driver(self._controllers, motion.targets, self._duration_s)
         return self._drivers[key].move(motion, self._monitor)
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
-        """Makes a message of the latest positions."""
+        """Returns a message with the latest positions of the joints."""
         return self._monitor.message(names)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Distinguishes fingers that an object stopped from fingers that had too little torque to move."""
+"""Distinguishes fingers that an object blocks from fingers with too little torque to move."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 
 from modular_framework_core.grasping.grasp_server import Outcome
 
-MOVED_SHARE = 0.2
-"""Fingers count as moved beyond this share of the tolerance."""
+MOVED_FRACTION = 0.2
+"""Minimum motion that counts as moved, as a fraction of the position tolerance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """A motion of the fingers, as it was commanded.
+    """Commanded motion of the fingers.
 
     Attributes:
-        begun: {joint: position} before the motion [rad or m].
-        targets: {joint: position} commanded [rad or m].
-        efforts: {joint: greatest effort} [N m or N]; one that is missing is the controller's own.
+        begun: Joint positions before the motion, by name [rad or m].
+        targets: Commanded joint positions, by name [rad or m].
+        efforts: Effort limits by joint name [Nm or N]; for other joints, the controller chooses the effort.
     """
 
     begun: Mapping[str, float]
@@ -28,20 +28,20 @@ class Attempt:
     efforts: Mapping[str, float]
 
     def direction(self, joint: str) -> float:
-        """Returns which way a joint was to move: 1.0 or -1.0."""
+        """Returns the direction of the commanded motion of a joint, 1.0 or -1.0."""
         return math.copysign(1.0, self.targets[joint] - self.begun.get(joint, self.targets[joint]))
 
     def effort(self, joint: str) -> float:
-        """Returns the greatest effort of a joint; the controller's own counts as unlimited."""
+        """Returns the effort limit of a joint; infinite if the controller chooses the effort."""
         return self.efforts.get(joint, math.inf)
 
 
 class StallEvidence:
-    """Judges stalls by the earlier motions of the fingers.
+    """Checks stalls against earlier motions of the fingers.
 
     Args:
-        tolerance: Greatest distance that counts as reached [rad or m]; it has to be a small share of the joints'
-            ranges, since within it neither their motion nor a shut hand can be detected.
+        tolerance: Position tolerance [rad or m]. The tolerance must be small compared with the joint ranges, because
+            smaller motions are not detected.
     """
 
     def __init__(self, tolerance: float) -> None:
@@ -50,17 +50,18 @@ class StallEvidence:
         self._moving_efforts: dict[tuple[str, float], float] = {}
 
     def judge(self, outcome: Outcome, attempt: Attempt) -> Outcome:
-        """Accepts a stall only when it was not a lack of torque that kept the fingers from moving.
+        """Rejects a stall that a lack of torque may have caused.
 
-        Some joint short of its target must have moved toward it, or press, or still hold since the stall
-        before, or have moved this way earlier with no more effort: then a new object stops it.
+        A stall is accepted under one of these conditions: the fingers press; they still hold the object of the last
+        stall; a joint that did not reach its target has moved towards the target; or this joint has moved in the same
+        direction before with at most the same effort.
 
         Args:
             outcome: Result reported by the controller.
-            attempt: What was commanded.
+            attempt: Commanded motion.
 
         Returns:
-            The outcome; not stalled, and with the reason, when none of that holds.
+            The outcome; for a rejected stall, `stalled` is False and the text has the reason.
         """
         judged = outcome
         if outcome.stalled and not (
@@ -71,8 +72,8 @@ class StallEvidence:
             judged = replace(
                 outcome,
                 stalled=False,
-                text="the fingers have not moved, so nothing shows that something "
-                "stopped them; give them more torque, or begin farther open"
+                text="the fingers have not moved, so a lack of torque may be the cause; "
+                "increase the torque, or start with wider open fingers"
                 f"{'; ' + outcome.text if outcome.text else ''}",
             )
         self._held = judged if judged.stalled else None
@@ -100,8 +101,8 @@ class StallEvidence:
     def _moved(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
         if name not in attempt.begun or name not in outcome.positions:
             return False
-        way = attempt.direction(name) * (outcome.positions[name] - attempt.begun[name])
-        return way > MOVED_SHARE * self._tolerance
+        distance = attempt.direction(name) * (outcome.positions[name] - attempt.begun[name])
+        return distance > MOVED_FRACTION * self._tolerance
 
     def _remember(self, outcome: Outcome, attempt: Attempt) -> None:
         for name in attempt.targets:
