@@ -189,7 +189,7 @@ def test_the_sentence_names_the_longest_part_and_the_bodies_in_the_way() -> None
         Refusals("gripper_link", "shelf_3", 9_120),
     )
     assert slow.summary == (
-        "search took 310 of 320 ms: 41,000 collision checks, 12.0% undecided by the bounds, 64% refused: "
+        "search took 310 of 320 ms: 41,000 collision checks, 12.0% undecided by the bounds, 64% in collision: "
         "narrow passage between 'gripper_link' and 'shelf_3'"
     )
     wide = replace(slow, checks={"search": replace(counts, touching_by_bounds=920, free_by_bounds=35_160)})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Contacts between bodies, as collision checks return them, errors carry them and messages report them."""
+"""Contacts between bodies, returned by collision checks and reported in errors and messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LINK, ATTACHED, WORLD = "robot_link", "robot_attached", "world_object"
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """The body that a collision geometry belongs to."""
+    """Body of a collision geometry: a link, an attached object or a world object."""
 
     name: str
     kind: str
@@ -24,9 +24,14 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Two bodies that touch; position [m] and normal (from first to second) in the planning frame, depth [m].
+    """Contact of two bodies.
 
-    Where a distance has to be kept, touching means being closer, and the depth is what is missing.
+    Attributes:
+        first: First body.
+        second: Second body.
+        depth: Penetration depth [m]; for pairs with a margin, the margin minus the distance.
+        position: Position in the planning frame, shape (3,) [m].
+        normal: Unit normal from the first to the second body in the planning frame, shape (3,).
     """
 
     first: Body
@@ -36,7 +41,7 @@ class Contact:
     normal: NDArray[np.float64]
 
     def describe(self) -> str:
-        """Says which body touches which and how deep."""
+        """Returns a text with the two bodies and the depth."""
         return f"{_label(self.first)} touches {_label(self.second)}, {self.depth * 1000.0:.1f} mm deep"
 
 
@@ -46,7 +51,7 @@ def _label(body: Body) -> str:
     return f"object '{body.name}'" + (f" held by '{body.link}'" if body.kind == ATTACHED else "")
 
 
-def describe_contacts(contacts: Sequence[Contact], most: int = 4) -> str:
-    """Joins the deepest contacts into one sentence."""
-    text = "; ".join(item.describe() for item in contacts[:most])
-    return text + (f"; and {len(contacts) - most} more" if len(contacts) > most else "")
+def describe_contacts(contacts: Sequence[Contact], max_count: int = 4) -> str:
+    """Returns a text with the first contacts, which are the deepest."""
+    text = "; ".join(item.describe() for item in contacts[:max_count])
+    return text + (f"; and {len(contacts) - max_count} more" if len(contacts) > max_count else "")

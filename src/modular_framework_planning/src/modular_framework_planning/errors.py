@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The errors of the planner; each carries a MoveIt error code and a reason that a person can act on."""
+"""Errors of the planner, with a MoveIt error code and a reason for the user."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_ros.allowed_names import nearest
 
 
 class ErrorCode(IntEnum):
-    """Result codes; the numbers are those of moveit_msgs/MoveItErrorCodes."""
+    """Result codes, with the values of moveit_msgs/MoveItErrorCodes."""
 
     SUCCESS = 1
     FAILURE = 99999
@@ -47,13 +47,13 @@ class ErrorCode(IntEnum):
 
 
 class PlanningError(Exception):
-    """Base of the package's errors.
+    """Base class of the errors of this package.
 
     Attributes:
-        code: the error code in the response on the wire.
-        reason: where, what was got, what was allowed and what to do.
-        contacts: what touches, where that is the reason.
-        statistics: of the plan that failed; None where nothing was planned.
+        code: Error code of the response message.
+        reason: Location, value found, allowed values and remedy.
+        contacts: Contacts that caused the error; empty for other causes.
+        statistics: Statistics of the failed plan; None if planning has not started.
     """
 
     def __init__(
@@ -71,21 +71,21 @@ class PlanningError(Exception):
 
 
 class ModelError(PlanningError):
-    """The robot's description cannot be used."""
+    """The robot description is invalid."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(ErrorCode.FAILURE, reason)
 
 
 class GeometryError(PlanningError):
-    """A shape, a pose or a number in a message is not usable."""
+    """A shape, a pose or a number in a message is invalid."""
 
     def __init__(self, reason: str, code: ErrorCode = ErrorCode.FAILURE) -> None:
         super().__init__(code, reason)
 
 
 class UnknownNameError(PlanningError):
-    """A group, joint, link, frame or object of that name does not exist."""
+    """A group, joint, link, frame or object with the given name does not exist."""
 
     def __init__(self, code: ErrorCode, kind: str, name: str, allowed: object) -> None:
         names = sorted(str(item) for item in allowed) if isinstance(allowed, Iterable) else [str(allowed)]

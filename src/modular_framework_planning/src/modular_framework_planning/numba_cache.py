@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses the folder in which numba caches compiled loops; to be imported before numba.
+"""Sets the folder of numba's cache; import this module before numba.
 
-The folder is below the user's cache folder, never in the source tree, and is named after the contents of every module
-with compiled loops: numba does not notice that a function which it inlined from another module has changed.
+The folder is below the user's cache folder, never in the source tree. Its name is a hash of all modules with compiled
+kernels, because numba does not detect changes of functions that it inlined from a different module.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 
 def cache_folder() -> Path:
-    """Returns the folder of this version of the compiled loops."""
+    """Returns the cache folder for this version of the compiled kernels."""
     contents = hashlib.sha256()
     for source in sorted(Path(__file__).parent.rglob("compiled_*.py")):
         contents.update(source.read_bytes())
@@ -25,15 +25,15 @@ def cache_folder() -> Path:
 
 
 def cache_is_empty() -> bool:
-    """Whether nothing has been compiled yet."""
+    """Returns whether the cache contains no compiled kernel."""
     return not any(Path(os.environ["NUMBA_CACHE_DIR"]).rglob("*.nbi"))
 
 
 def make_saves_exclusive() -> None:
-    """Lets only one process at a time write to the cache.
+    """Makes writes to the cache exclusive between processes.
 
-    To save a loop, numba reads an index, changes it and writes it back. Two processes that save the same loop for other
-    argument types would overwrite each other's entries.
+    To save a kernel, numba reads an index, changes it and writes it back. Two processes that save the same kernel for
+    different argument types would otherwise overwrite each other's entries.
     """
     from numba.core.caching import IndexDataCacheFile  # imported here, see above
 

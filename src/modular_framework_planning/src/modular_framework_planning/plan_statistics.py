@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a plan took: the time of its parts, what each layer of the collision check decided, and what slowed it down."""
+"""Statistics of a plan: duration of each phase, results of the layers of the collision check, and the main obstacle."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-NARROW_SHARE = 0.5  # of checks that are refused: from here on the way counts as narrow
+NARROW_FRACTION = 0.5  # minimum fraction of checks in collision that counts as a narrow passage
 
 
 @dataclass(frozen=True, slots=True)
 class CheckCounts:
-    """How many checks of states, edges and curves each layer decided.
+    """Numbers of collision checks of states, edges and curves, by the layer that decided them.
 
     Attributes:
-        asked: checks that were asked for; one that was remembered does not count.
-        free_by_bounds, touching_by_bounds: decided by the compiled check of spheres and surfaces.
-        undecided: left to the exact check (Coal).
-        touching_exactly: of these, those in which bodies touch.
-        states: that the compiled check looked at, those of undecided edges of a compiled search twice.
+        asked: Requested checks, without cached results.
+        free_by_bounds: Checks that the compiled check of spheres and surfaces found free.
+        touching_by_bounds: Checks that the compiled check found in collision.
+        undecided: Checks left to the exact check (Coal).
+        touching_exactly: Checks that the exact check found in collision.
+        states: States processed by the compiled check; states of undecided edges of a compiled search count twice.
     """
 
     asked: int
@@ -31,15 +32,21 @@ class CheckCounts:
 
     @property
     def refused(self) -> int:
-        """How many checks found bodies that touch."""
+        """Number of checks that found a collision."""
         return self.touching_by_bounds + self.touching_exactly
 
 
 @dataclass(frozen=True, slots=True)
 class Refusals:
-    """Two bodies by name, and in how many checks they touched; of links on one joint the first is named.
+    """Pair of bodies with the most collisions.
 
-    Where several pairs touch, the first pair found counts.
+    The first link of a joint represents all links on this joint. A check with several colliding pairs counts for the
+    pair that is found first.
+
+    Attributes:
+        first: Name of the first body.
+        second: Name of the second body.
+        checks: Number of checks in which the bodies collide.
     """
 
     first: str
@@ -49,16 +56,16 @@ class Refusals:
 
 @dataclass(frozen=True, slots=True)
 class PlannerRun:
-    """What planned, as it was resolved.
+    """Resolved pipeline, planner and settings of a plan.
 
     Attributes:
-        pipeline: the planning pipeline.
-        planner: its planner.
-        settings: parameters of the planner, those of the group among them.
-        adapters: request adapters, outermost first.
-        implementation: who searched: `compiled`, `OMPL`, `CBiRRT`; empty where no search was needed or it never began.
-        replaced: the planner_id that was asked for and that the pipeline does not have; empty otherwise.
-        solver: Method of the inverse kinematics of pose goals; empty if there is no pose goal.
+        pipeline: Planning pipeline.
+        planner: Planner of the pipeline.
+        settings: Parameters of the planner, including parameters of the group.
+        adapters: Request adapters, outermost first.
+        implementation: Implementation of the search (`compiled`, `OMPL` or `CBiRRT`); empty without a search.
+        replaced: Requested planner_id that the pipeline does not have; otherwise empty.
+        solver: Inverse kinematics solver of pose goals; empty without a pose goal.
     """
 
     pipeline: str
@@ -72,14 +79,14 @@ class PlannerRun:
 
 @dataclass(frozen=True, slots=True)
 class PlanStatistics:
-    """Statistics of one plan, also of one that failed.
+    """Statistics of a successful or failed plan.
 
     Attributes:
-        phases_s: how long its parts took [s].
-        checks: of the collision checker by part of the plan; empty for a checker that does not count.
-        refusals: the two bodies that refused the most checks; None where none did.
-        run: what planned; None where the request was refused before.
-        processor_s: processor time of the plan [s], which plans at the same time do not lengthen by waiting.
+        phases_s: Durations of the phases, by name [s].
+        checks: Collision checks by phase; empty if the collision checker has no counters.
+        refusals: Pair of bodies with the most collisions; None without a collision.
+        run: Resolved pipeline and planner; None if the request was rejected before planning.
+        processor_s: Processor time of the plan [s]; independent of concurrent plans.
     """
 
     phases_s: Mapping[str, float] = field(default_factory=dict)
@@ -90,25 +97,25 @@ class PlanStatistics:
 
     @property
     def summary(self) -> str:
-        """One sentence: which part took the longest, and why; empty where nothing was measured."""
+        """Sentence with the longest phase and its cause; empty without measurements."""
         if not self.phases_s:
             return ""
-        part = max(self.phases_s, key=lambda name: self.phases_s[name])
-        text = f"{part} took {1e3 * self.phases_s[part]:.0f} of {1e3 * sum(self.phases_s.values()):.0f} ms"
-        counts = self.checks.get(part)
+        phase = max(self.phases_s, key=lambda name: self.phases_s[name])
+        text = f"{phase} took {1e3 * self.phases_s[phase]:.0f} of {1e3 * sum(self.phases_s.values()):.0f} ms"
+        counts = self.checks.get(phase)
         if counts is None or not counts.asked:
             return text
         text += f": {counts.asked:,} collision checks, {counts.undecided / counts.asked:.1%} undecided by the bounds"
         if self.refusals is None or not counts.refused:
             return text
         bodies = f"'{self.refusals.first}' and '{self.refusals.second}'"
-        share = counts.refused / counts.asked
-        return f"{text}, {share:.0%} refused: " + (
-            f"narrow passage between {bodies}" if share >= NARROW_SHARE else f"most often {bodies} touched"
+        fraction = counts.refused / counts.asked
+        return f"{text}, {fraction:.0%} in collision: " + (
+            f"narrow passage between {bodies}" if fraction >= NARROW_FRACTION else f"most often {bodies}"
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Returns what ~planning_report says, for json.dumps."""
+        """Returns the fields for ~planning_report as JSON types."""
         return {
             "phases_s": dict(self.phases_s),
             "processor_s": self.processor_s,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cartesian paths: straight lines between poses as joint positions, how far they go, and why they end early.
+"""Cartesian paths: joint positions along straight lines between poses, with the reason if a path ends early.
 
-The joints follow the line by continuation, so they cannot change the arm's posture on the way; between two rows the
-straight motion of the joints keeps the link within a tenth of a millimetre of the line for steps of a centimetre.
+The joints follow a line by continuation, so the arm configuration does not change along the line. Between two points
+that are 1 cm apart, interpolation of the joint positions deviates from the line by less than 0.1 mm.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 
-LONGEST_STEP_M = 0.01  # a longer max_step is followed in steps of this length
-RADIANS_PER_METRE = 3.5  # a step of 0.01 m may turn by 0.035 rad, as in MoveIt
-MAX_STEPS = 50_000  # of one request
-MIN_STEPS_FOR_MEAN = 10  # of a line, where a jump is judged by the mean step
+MAX_STEP_M = 0.01  # upper bound for max_step of a request
+RADIANS_PER_METRE = 3.5  # a step of 0.01 m may rotate by 0.035 rad, as in MoveIt
+MAX_STEPS = 50_000  # per request
+MIN_STEPS_FOR_MEAN = 10  # per line, if jumps are detected by the mean step
 
 Objection = Callable[[Array, Array], str]
 
 
 @dataclass(frozen=True, slots=True)
 class JumpThresholds:
-    """Thresholds of a joint-space jump between two steps; 0 switches a test off.
+    """Thresholds of a joint-space jump between two points; 0 disables a threshold.
 
     Attributes:
-        factor: a step further than this times the mean step of its line, in joint space.
-        prismatic: change of a prismatic joint [m].
-        revolute: change of a revolute joint [rad].
+        factor: Maximum ratio of a step to the mean step of its line, in joint space.
+        prismatic: Maximum step of a prismatic joint [m].
+        revolute: Maximum step of a revolute joint [rad].
     """
 
     factor: float = 0.0
@@ -47,14 +47,14 @@ NO_JUMP_TEST = JumpThresholds()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightLine:
-    """The part of the lines that was followed.
+    """Followed part of the lines.
 
     Attributes:
-        rows: joint values of the group, the start first, shape (n, joints).
-        fraction: of the lines, each line counting the same, in [0, 1].
-        waypoint_rows: the row of each waypoint that was reached.
-        stop: why the lines were not followed to their end; empty if they were.
-        code: error code of that cause.
+        rows: Joint positions of the group, from the start, shape (n, joints) [rad or m].
+        fraction: Followed fraction of the lines in [0, 1]; all lines have equal weight.
+        waypoint_rows: Row index of each reached waypoint.
+        stop: Reason why the path ends early; empty for a complete path.
+        code: Error code of this reason.
     """
 
     rows: Array
@@ -65,17 +65,17 @@ class StraightLine:
 
 
 def no_objection(_before: Array, _after: Array) -> str:
-    """Allows every step."""
+    """Accepts every step."""
     return ""
 
 
 def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: float) -> Objection:
-    """Refuses steps that touch something and names the contact.
+    """Returns a function that rejects steps in collision and names the contacts.
 
     Args:
-        checker: of the scene.
-        motion: of the group.
-        step: between two checked states [rad or m].
+        checker: Collision checker of the scene.
+        motion: Motion checker of the group.
+        step: Distance between two checked states [rad or m].
     """
 
     def objection(before: Array, after: Array) -> str:
@@ -97,18 +97,18 @@ def straight_line(
     objection: Objection = no_objection,
     carried: Transform | None = None,
 ) -> StraightLine:
-    """Follows straight lines through waypoints until something is in the way.
+    """Follows straight lines through waypoints until a step is not allowed.
 
     Args:
-        follower: kinematics of the link that follows the lines, or carries what follows them, from its rest state.
-        waypoints: poses in the planning frame of what follows the lines.
-        max_step_m: longest step [m].
-        jumps: what counts as a jump.
-        objection: takes the joint values before and after each step; returns why it is not allowed, or "".
-        carried: pose, in the link's frame, of what follows the lines (a held object); None: the link itself does.
+        follower: Kinematics of the link, starting at its rest state.
+        waypoints: Poses of the moved frame in the planning frame.
+        max_step_m: Maximum step [m].
+        jumps: Thresholds of a joint-space jump.
+        objection: Function of the joint positions before and after a step; returns the reason to reject it, or "".
+        carried: Pose of the moved frame in the link frame, such as the pose of a held object; None for the link frame.
 
     Raises:
-        PlanningError: the step is not above 0 or gives more than 50,000 steps, a threshold is below 0, or there is no
+        PlanningError: The step is not above 0 or gives more than 50,000 steps, a threshold is below 0, or there is no
             waypoint.
     """
     _require_usable(waypoints, max_step_m, jumps)
@@ -117,7 +117,7 @@ def straight_line(
     to_link = pin.SE3.Identity() if carried is None else carried.inverse()
     poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]
     lines = [
-        _Line(follower, (before, after, to_link), min(max_step_m, LONGEST_STEP_M), jumps, objection)
+        _Line(follower, (before, after, to_link), min(max_step_m, MAX_STEP_M), jumps, objection)
         for before, after in zip(poses[:-1], poses[1:], strict=True)
     ]
     _require_countable(lines, max_step_m)
@@ -139,20 +139,20 @@ def straight_line(
 
 def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: JumpThresholds) -> None:
     if not waypoints:
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "waypoints: there is none; give at least one pose")
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "waypoints: the list is empty; give at least one pose")
     if len(waypoints) > MAX_STEPS:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"waypoints: {len(waypoints)}; at most {MAX_STEPS} are followed: thin them out",
+            f"waypoints: got {len(waypoints)}; allowed: at most {MAX_STEPS}; use fewer waypoints",
         )
     if not (np.isfinite(max_step_m) and max_step_m > 0.0):
-        raise PlanningError(ErrorCode.FAILURE, f"max_step is {max_step_m}; a length above 0 m is needed")
+        raise PlanningError(ErrorCode.FAILURE, f"max_step is {max_step_m}; allowed: more than 0 m")
     for name in ("factor", "prismatic", "revolute"):
         value = getattr(jumps, name)
         if not (np.isfinite(value) and value >= 0.0):
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
-                f"jump threshold '{name}' is {value}; it must be above 0, or 0 for no such test",
+                f"jump threshold '{name}' is {value}; allowed: more than 0, or 0 to disable the threshold",
             )
 
 
@@ -162,12 +162,12 @@ def _require_countable(lines: Sequence[_Line], max_step_m: float) -> None:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
             f"{len(lines)} waypoints with max_step {max_step_m} m take "
-            f"{steps} steps; at most {MAX_STEPS} are followed: choose a longer step or fewer lines",
+            f"{steps} steps; allowed: at most {MAX_STEPS}; use a longer step or fewer waypoints",
         )
 
 
 class _Line:
-    """One straight line."""
+    """Straight line between two poses."""
 
     def __init__(
         self,
@@ -180,18 +180,18 @@ class _Line:
         """Divides the line into steps.
 
         Args:
-            follower: solves for the joints.
-            ends: first and last pose of what follows the line, and pose of the follower's link in its frame.
-            step_m: longest step [m].
-            jumps: what counts as a jump.
-            objection: says why a step is not allowed, or nothing.
+            follower: Kinematics of the link.
+            ends: First and last pose of the moved frame, and pose of the link in the moved frame.
+            step_m: Maximum step [m].
+            jumps: Thresholds of a joint-space jump.
+            objection: Function that returns the reason to reject a step, or "".
         """
         start, end, self._to_link = ends
         self._follower, self._start, self._end = follower, start, end
         self._jumps, self._objection = jumps, objection
-        self._turn = pin.log3(start.rotation.T @ end.rotation)
+        self._rotation_vector = pin.log3(start.rotation.T @ end.rotation)
         length = float(np.linalg.norm(end.translation - start.translation))
-        angle = float(np.linalg.norm(self._turn))
+        angle = float(np.linalg.norm(self._rotation_vector))
         self.count = max(
             1,
             int(np.ceil(max(length / step_m, angle / (RADIANS_PER_METRE * step_m)) - 1e-9)),
@@ -199,17 +199,17 @@ class _Line:
         )
 
     def _pose(self, number: int) -> Transform:
-        share = number / self.count
+        fraction = number / self.count
         return (
             pin.SE3(
-                self._start.rotation @ pin.exp3(share * self._turn),
-                self._start.translation + share * (self._end.translation - self._start.translation),
+                self._start.rotation @ pin.exp3(fraction * self._rotation_vector),
+                self._start.translation + fraction * (self._end.translation - self._start.translation),
             )
             * self._to_link
         )
 
     def follow(self, begin: Array) -> tuple[list[Array], str, ErrorCode]:
-        """Returns the rows after the first, why they end early ("" if they do not) and the code of that."""
+        """Returns the rows after the first, the reason for an early end ("" for none), and its error code."""
         rows, change = [begin], np.zeros_like(begin)
         stop, code = "", ErrorCode.SUCCESS
         for number in range(1, self.count + 1):
@@ -230,7 +230,7 @@ class _Line:
         return kept[1:], stop, code
 
     def _jump(self, before: Array, after: Array) -> str:
-        """Tests a step by the absolute thresholds."""
+        """Returns the joint that exceeds an absolute threshold as text, or ""."""
         group, kinds = self._follower.group, self._follower.model.document.joint_kinds
         for joint, low, high in zip(group.joints, before, after, strict=True):
             prismatic = kinds[joint] == "prismatic"
@@ -243,7 +243,7 @@ class _Line:
         return ""
 
     def _without_far_step(self, rows: list[Array]) -> tuple[list[Array], str]:
-        """Cuts the rows before the first step that is far above the mean."""
+        """Removes all rows after the first step that exceeds the jump factor; returns the rest and the reason."""
         if self._jumps.factor <= 0.0 or len(rows) < 3:
             return rows, ""
         changes = np.diff(np.array(rows), axis=0)
@@ -254,6 +254,6 @@ class _Line:
         first = int(far[0])
         joint = self._follower.group.joints[int(np.abs(changes[first]).argmax())]
         return rows[: first + 1], (
-            f"a step of {sizes[first]:.4f} in joint space, most of it by joint '{joint}', is "
-            f"more than jump_threshold {self._jumps.factor} times the mean {sizes.mean():.4f}"
+            f"a step of {sizes[first]:.4f} in joint space, mostly by joint '{joint}', exceeds "
+            f"jump_threshold {self._jumps.factor} times the mean step {sizes.mean():.4f}"
         )

@@ -129,7 +129,7 @@ def warm_up(context: MoveGroupContext) -> None:
         PlanningError: The checker cannot check the scene or has no attribute `model`.
     """
     if cache_is_empty():
-        rospy.logwarn("compiling the planner's kernels, which takes some minutes once; ./install.sh does so in advance")
+        rospy.logwarn("compiling the planner's kernels; this takes some minutes (./install.sh compiles in advance)")
         compile_all()
     scene = context.monitor.snapshot()
     checker = context.new_checker(scene)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planners, each in a folder of its own."""
+"""Planners; each planner has its own package."""

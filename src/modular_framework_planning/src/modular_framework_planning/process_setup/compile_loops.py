@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiles every compiled loop of the product into numba's cache, so that no request and no launch waits for it.
+"""Compiles all numba kernels into numba's cache, so that no request and no launch waits for a compilation.
 
-Each loop is called the way the product calls it, with a robot and a scene small enough to cost nothing: what is in the
-cache already is only loaded. To be run once after the build:
+The module calls each kernel with the argument types of the product, for a small robot and scene. Cached kernels are
+only loaded. Run the module once after the build:
 python3 -m modular_framework_planning.process_setup.compile_loops
-Two processes then share the compilation. They compile few loops twice: kinematics that the collision loops inline.
+Two processes then share the compilation. They compile only the kinematics twice, which the collision kernels inline.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing import compiled_polylines, path_shortening, time_parameterization
 
 COLLISIONS = "collisions"
-"""Argument of the second process."""
+"""Command-line argument of the second process."""
 LINKS = 4
 MOTION_STEP = 0.05  # [rad]
 TETRAHEDRON = np.array(
@@ -54,7 +54,7 @@ TETRAHEDRON = np.array(
 
 
 def compile_all() -> float:
-    """Compiles every loop, or loads it from the cache; returns how long that took [s]."""
+    """Compiles all kernels, or loads them from the cache; returns the duration [s]."""
     begun = time.monotonic()
     robot = _robot()
     _compile_motions(robot)
@@ -63,10 +63,10 @@ def compile_all() -> float:
 
 
 def compile_in_two_processes() -> float:
-    """Does what `compile_all` does, with the collision loops in a second process; returns how long that took [s].
+    """Compiles all kernels, with the collision kernels in a second process; returns the duration [s].
 
     Raises:
-        subprocess.CalledProcessError: The second process failed; its output has the reason.
+        subprocess.CalledProcessError: The second process failed; its output contains the reason.
     """
     begun = time.monotonic()
     make_saves_exclusive()
@@ -78,12 +78,12 @@ def compile_in_two_processes() -> float:
             collisions.kill()
     if code:
         raise subprocess.CalledProcessError(code, collisions.args)
-    compile_all()  # loads, so that the cache is known to be complete
+    compile_all()  # loads all kernels and compiles missing ones
     return time.monotonic() - begun
 
 
 def _compile_motions(robot: RobotModel) -> None:
-    """Compiles kinematics, timing and constraints."""
+    """Compiles the kernels of kinematics, timing and constraints."""
     compiled_kinematics.warm_up()
     compiled_polylines.warm_up()
     time_parameterization.warm_up()
@@ -91,15 +91,15 @@ def _compile_motions(robot: RobotModel) -> None:
 
 
 def _compile_collisions(robot: RobotModel) -> None:
-    """Compiles what needs a scene: maps, collision checks and the searches that use them."""
+    """Compiles the kernels that need a scene: octomaps, collision checks and searches."""
     build_sphere_tree(TETRAHEDRON)
     _check_motions(_scene(robot, _voxels()))
-    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
+    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: meshes import for 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
 
 
 def _robot() -> RobotModel:
-    """A chain of boxes."""
+    """Returns a robot with a chain of boxes."""
     links = "".join(
         f'<link name="l{n}"><collision><geometry><box size="0.1 0.1 0.2"/></geometry></collision></link>'
         for n in range(LINKS)
@@ -115,14 +115,14 @@ def _robot() -> RobotModel:
 
 
 def _voxels() -> VoxelMap:
-    """Inserts a point cloud, and writes and reads the map in both encodings."""
+    """Returns a map with a point cloud, after writing and reading it in both encodings."""
     point = np.array([[1.5, 0.0, 0.0]])
     seen = empty_map(0.1).with_point_cloud(np.zeros(3), point, point + 0.5, point + 1.0)
     return read_stream(write_binary(read_stream(write_full(seen), seen.resolution, False)), seen.resolution, True)
 
 
 def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
-    """One obstacle of each kind beside the robot, one around its last link, and something held."""
+    """Returns a scene with one obstacle of each kind, a mesh around the last link, and a held object."""
     corners = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
@@ -159,13 +159,13 @@ def _check_motions(scene: PlanningScene) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Compiles everything and prints the duration, or compiles the collision loops as the second process."""
+    """Compiles all kernels and prints the duration, or compiles the collision kernels as the second process."""
     if arguments == [COLLISIONS]:
         make_saves_exclusive()
         _compile_collisions(_robot())
     else:
         took_s = compile_in_two_processes() if cache_is_empty() else compile_all()
-        print(f"compiled loops are ready after {took_s:.1f} s")
+        print(f"the compiled kernels are ready after {took_s:.1f} s")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings of the interpreter and of the C library for a process in which several plans run beside short requests."""
+"""Settings of the interpreter and the C library for a process that runs several plans and short requests in threads."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import ctypes
 import sys
 
 SWITCH_INTERVAL_S = 0.0005
-M_ARENA_MAX = -8  # glibc's name and number of mallopt's parameter
+M_ARENA_MAX = -8  # name and value of a mallopt parameter in glibc
 ARENAS = 2
 
 
 def prepare() -> None:
-    """Reduces waits between threads; to be called before the process starts threads.
+    """Reduces latency and memory of a process with many threads; call it before the process starts threads.
 
-    A thread that wakes up for a message waits for the interpreter behind every plan in turn, at Python's default up to
-    5 ms each and several times a message: a change of the scene beside eight plans would take a third of a second.
+    A thread that handles a message competes with all planning threads for the interpreter lock. With Python's default
+    switch interval of 5 ms, a scene update would take about 0.3 s beside eight plans.
 
-    glibc gives each thread that finds the others busy an arena of its own, up to eight a core, and what a plan has
-    freed in one is of no use to a thread with another. Other C libraries are left as they are.
+    By default, glibc creates up to eight memory arenas per core. Memory freed in one arena is not available to threads
+    that use a different arena. On other C libraries, the function does not change the allocator.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)

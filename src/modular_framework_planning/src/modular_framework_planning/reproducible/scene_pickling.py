@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serialisation of requests for a process with the same robot, without robot model and built geometry."""
+"""Pickling of requests for a process with the same robot, without the robot model and collision geometry."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-ROBOT = "robot model"
+ROBOT_ID = "robot model"
 
 
-def _shape(kind: type[Shape], values: dict[str, Any]) -> Shape:
+def _make_shape(kind: type[Shape], values: dict[str, Any]) -> Shape:
     return kind(**values)
 
 
@@ -25,12 +25,12 @@ class _Pickler(pickle.Pickler):
 
     def persistent_id(self, item: Any) -> str | None:
         """Replaces the robot model by an id."""
-        return ROBOT if isinstance(item, RobotModel) else None
+        return ROBOT_ID if isinstance(item, RobotModel) else None
 
     def reducer_override(self, item: Any) -> Any:
-        """Writes shapes without built geometry, constraints without working memory and errors as their base class."""
+        """Writes shapes without collision geometry, constraints without buffers, and errors as their base class."""
         if isinstance(item, Shape):
-            return _shape, (type(item), {field.name: getattr(item, field.name) for field in fields(item)})  # type: ignore[arg-type]
+            return _make_shape, (type(item), {field.name: getattr(item, field.name) for field in fields(item)})  # type: ignore[arg-type]
         if isinstance(item, KinematicConstraints):
             return KinematicConstraints, (item.model, item.joints, item.positions, item.orientations, item.name)
         if isinstance(item, PlanningError):
@@ -47,8 +47,8 @@ class _Unpickler(pickle.Unpickler):
 
     def persistent_load(self, name: str) -> RobotModel:
         """Returns the robot model."""
-        if name != ROBOT:
-            raise pickle.UnpicklingError(f"unknown persistent id '{name}'; allowed: '{ROBOT}'")
+        if name != ROBOT_ID:
+            raise pickle.UnpicklingError(f"unknown persistent id '{name}'; allowed: '{ROBOT_ID}'")
         return self._model
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class for actions that plan and, unless plan_only is set, execute, with replanning after failures."""
+"""Base class for actions that plan, execute the plan unless plan_only is set, and replan after failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from modular_framework_planning.move_group.goal_runner import error_code_of
 from modular_framework_planning.move_group.planning_options import check_options, scene_change
 from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
-MIN_DELAY_S = 0.05  # between attempts, so that immediate failures do not flood the log
+MIN_REPLAN_DELAY_S = 0.05  # between attempts, so that immediate failures do not flood the log
 RETRYABLE_CODES = (
     ErrorCode.PLANNING_FAILED,
     ErrorCode.INVALID_MOTION_PLAN,
@@ -42,7 +42,11 @@ class PlannedMotion:
 
 
 class PlannedMotionAction(ActionCapability):
-    """Supports all planning_options except look_around; `report` is the kind of result in failure reports."""
+    """Supports all planning_options except look_around.
+
+    Attributes:
+        report: `kind` of the planning report if the action fails.
+    """
 
     report: str
 
@@ -56,7 +60,7 @@ class PlannedMotionAction(ActionCapability):
                 result, text = self._plan_and_execute(goal, cancelled, publish_state)
                 if error_code_of(result).val not in RETRYABLE_CODES or attempt + 1 == attempts:
                     break
-                if cancelled.wait(max(options.replan_delay, MIN_DELAY_S)):
+                if cancelled.wait(max(options.replan_delay, MIN_REPLAN_DELAY_S)):
                     raise PlanningError(ErrorCode.PREEMPTED, "cancelled before the next attempt")
         except PlanningError as error:
             error_code_of(result).val = self._context.reporter.failure(self.report, error, **self._details(goal))
@@ -66,11 +70,11 @@ class PlannedMotionAction(ActionCapability):
 
     def _plan_and_execute(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
         """Plans and executes once; failures are returned as code and reason."""
-        moves = not goal.planning_options.plan_only
-        change = scene_change(goal.planning_options, moves)
+        executes = not goal.planning_options.plan_only
+        change = scene_change(goal.planning_options, executes)
         publish_state("PLANNING")
         planned = self._plan(goal, change, cancelled)
-        if not moves or planned.execute is None:
+        if not executes or planned.execute is None:
             return planned.result, planned.text
         publish_state("MONITOR")
         try:
@@ -88,7 +92,7 @@ class PlannedMotionAction(ActionCapability):
 
         Args:
             goal: Goal message.
-            change: Change of the monitored scene for this plan only.
+            change: Change to the monitored scene that applies to this plan only.
             cancelled: Event that is set when the client cancels the goal.
         """
 

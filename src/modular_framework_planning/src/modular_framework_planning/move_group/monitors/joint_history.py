@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""History of joint positions, because sensor data are processed some time after their measurement."""
+"""History of joint positions, for sensor data that are processed after their time stamp."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class JointHistory:
         self._positions: deque[Array] = deque(maxlen=HISTORY_LENGTH)
 
     def add(self, stamp_s: float, positions: Array) -> None:
-        """Stores positions [rad or m]; a time before the last time indicates a clock reset and clears the history."""
+        """Stores positions [rad or m]; a stamp more than 1 s before the newest one clears the history (clock reset)."""
         if self._times and stamp_s < self._times[-1] - 1.0:
             self._times.clear()
             self._positions.clear()
@@ -45,7 +45,7 @@ class JointHistory:
         return bool(self._times) and self._times[-1] >= stamp_s
 
     def positions_at(self, stamp_s: float) -> Array:
-        """Returns interpolated positions at a time; endless joints rotate the short way.
+        """Returns interpolated positions at a time; continuous joints are interpolated along the shorter direction.
 
         Raises:
             PlanningError: The time is outside the history.

@@ -25,7 +25,7 @@ from modular_framework_planning.perception.depth_images import (
 from modular_framework_planning.perception.self_filter import FilterMaker, depth_self_filter, self_filter_of
 from modular_framework_planning.perception.sensor_settings import DepthImageSettings, PointCloudSettings, SensorSettings
 
-FLOAT_POINT = np.dtype("<f4")
+FLOAT32 = np.dtype("<f4")
 
 
 class InsertPointCloud(Protocol):
@@ -99,18 +99,18 @@ class PointCloudUpdater(_Updater):
     def _process(self, message: PointCloud2) -> None:
         s = self._settings
         seen = points_of_cloud(cloud_array(message), s.max_range, s.point_subsample)
-        hidden = self._insert(
+        on_known_body = self._insert(
             message.header.frame_id,
             message.header.stamp,
             seen,
             lambda regions, bodies, _: self_filter_of(regions, bodies, s.padding_scale, s.padding_offset),
         )
         if self._filtered is not None:
-            self._filtered.publish(_cloud_message(message.header, seen.ends[~hidden]))
+            self._filtered.publish(_cloud_message(message.header, seen.ends[~on_known_body]))
 
 
 class DepthImageUpdater(_Updater):
-    """Subscribes to a depth image and its camera_info, and publishes the image without robot and known objects."""
+    """Subscribes to a depth image and its camera_info; publishes the image with robot and known objects removed."""
 
     def __init__(self, settings: DepthImageSettings, insert: InsertPointCloud) -> None:
         super().__init__(settings, insert, settings.queue_size)
@@ -147,7 +147,7 @@ class DepthImageUpdater(_Updater):
             s.far_clipping_plane_distance,
             (s.skip_vertical_pixels, s.skip_horizontal_pixels),
         )
-        hidden = self._insert(
+        on_known_body = self._insert(
             message.header.frame_id,
             message.header.stamp,
             seen,
@@ -158,7 +158,8 @@ class DepthImageUpdater(_Updater):
         )
         if self._filtered is not None:
             filtered = np.zeros(depth.size)
-            filtered[seen.pixels[~hidden]] = depth.ravel()[seen.pixels[~hidden]]
+            kept_pixels = seen.pixels[~on_known_body]
+            filtered[kept_pixels] = depth.ravel()[kept_pixels]
             data = np.clip(np.round(filtered * 1000.0), 0, 65535).astype("<u2").tobytes()
             self._filtered.publish(
                 Image(
@@ -174,7 +175,7 @@ class DepthImageUpdater(_Updater):
 
 def _cloud_message(header: Any, points: Any) -> PointCloud2:
     fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate("xyz")]
-    data = np.ascontiguousarray(points, dtype=FLOAT_POINT).tobytes()
+    data = np.ascontiguousarray(points, dtype=FLOAT32).tobytes()
     return PointCloud2(
         header=header,
         height=1,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Correction of a start state that violates the path constraints by the nearest state that satisfies them."""
+"""Replaces a start state that violates the path constraints with the nearest state that satisfies them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 
 
 class FixStartStatePathConstraints(RequestAdapter):
-    """Prepends a straight, free motion from the start to a state that satisfies the path constraints."""
+    """Prepends a collision-free straight-line motion to a state that satisfies the path constraints."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
         """Plans from the nearest state that satisfies the path constraints."""
@@ -25,8 +25,8 @@ class FixStartStatePathConstraints(RequestAdapter):
             raise PlanningError(
                 ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
                 "start state: "
-                f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
-                "satisfies the path constraints; choose a different start",
+                f"{constraints.describe(problem.start)}; no collision-free straight-line motion reaches a state "
+                "that satisfies the path constraints; choose a different start state",
             )
         path = plan_next(problem.with_start(nearest))
         return with_path_prefix(problem, path)
