@@ -374,12 +374,18 @@ SOFT_VALUES = {"soft_lower_limit": -0.5, "soft_upper_limit": 0.5, "k_position": 
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"has_position_limits": True, "max_position": 0.1}, "only max_position are set"),
-        ({"has_position_limits": True}, "of min_position, max_position only none are set"),
-        ({"has_velocity_limits": True}, "of max_velocity only none are set"),
-        ({"min_position": -0.1, "max_position": 0.1}, "min_position, max_position without has_position_limits: true"),
-        ({"has_soft_limits": True, "k_position": 1.0}, "only k_position are set"),
-        (SOFT_VALUES, "k_velocity without has_soft_limits: true"),
+        (
+            {"has_position_limits": True, "max_position": 0.1},
+            "min_position, max_position is incomplete (set: max_position)",
+        ),
+        ({"has_position_limits": True}, "min_position, max_position is incomplete (set: none)"),
+        ({"has_velocity_limits": True}, "max_velocity is incomplete (set: none)"),
+        (
+            {"min_position": -0.1, "max_position": 0.1},
+            "min_position, max_position, because has_position_limits is not set",
+        ),
+        ({"has_soft_limits": True, "k_position": 1.0}, "is incomplete (set: k_position)"),
+        (SOFT_VALUES, "k_velocity, because has_soft_limits is not set"),
         ({"has_soft_limits": False, **SOFT_VALUES}, ""),
     ],
 )

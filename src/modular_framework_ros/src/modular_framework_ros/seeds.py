@@ -20,7 +20,7 @@ class SeedError(ValueError):
 
 
 def seed_parameter() -> int | None:
-    """Returns the parameter ``/seed``, at least 0; None if it is not set and random numbers may differ between runs.
+    """Returns the parameter ``/seed``, at least 0; None if unset, so that runs need not be reproducible.
 
     Raises:
         SeedError: The value is not an integer in the allowed range.
@@ -38,9 +38,9 @@ def _newest_value() -> Any:
     """Returns the cached value; rospy.get_param_cached calls the master each time while the parameter is not set."""
     cache = get_param_server_cache()
     with cache.lock:
-        known, name = cache.d or {}, SEED_PARAMETER.strip("/")
-        if name in known:
-            return known[name]
+        cached, name = cache.d or {}, SEED_PARAMETER.strip("/")
+        if name in cached:
+            return cached[name]
     return rospy.get_param_cached(SEED_PARAMETER, None)
 
 
@@ -49,7 +49,7 @@ def derived_seed(seed: int, *purpose: object) -> int:
 
     Args:
         seed: Seed of the launch.
-        purpose: Identifiers of the purpose, such as a component, a request, and the number of its earlier calls.
+        purpose: Identifiers of the purpose, such as a component, a request and a call counter.
 
     Returns:
         A seed from 0 to MAX_SEED.

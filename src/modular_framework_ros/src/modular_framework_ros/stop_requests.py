@@ -12,7 +12,7 @@ _THREAD = threading.local()
 
 @contextmanager
 def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
-    """Makes waits of this thread end on a stop request, inside the context.
+    """Context in which a stop request ends the waits of this thread.
 
     Args:
         requested: Function polled several times a second that returns whether to stop.

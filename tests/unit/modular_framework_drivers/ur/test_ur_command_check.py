@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modular_framework_control.hardware_interface.joint_limits import JointLimits, SoftJointLimits
-from modular_framework_control.trajectory.motion_limits import POINT_MARGIN
+from modular_framework_control.trajectory.motion_limits import GOAL_TOLERANCE
 from modular_framework_drivers.ur.arm_parameters import read_checked_joints
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 from modular_framework_ros.node_handle import MappingNodeHandle, ParameterError
@@ -192,7 +192,7 @@ def test_as_little_beyond_the_range_as_trajectory_controllers_allow_is_followed_
     check = checked(max_jump=4.0)
     check.reset([1.99, 0.0])
     for _ in range(100):
-        assert check.admit([2.0 + POINT_MARGIN, 0.0], DT_S) == ""
+        assert check.admit([2.0 + GOAL_TOLERANCE, 0.0], DT_S) == ""
     assert check.sent[0] == pytest.approx(2.0, abs=1e-6)
 
 

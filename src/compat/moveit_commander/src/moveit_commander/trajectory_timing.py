@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Retimes a path with fixed waypoints, so that the controller's interpolation keeps the joint limits."""
+"""Retimes a path with fixed waypoints, so that the controller's interpolation stays within the joint limits."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ ALGORITHMS = (
     "iterative_spline_parameterization",
     "time_optimal_trajectory_generation",
 )
-GRID_POINTS = 20  # between two waypoints
-SAME_POINT = 1e-6  # [rad or m]; distance below which waypoints are merged
-SAMPLES = 64  # of the curve between two waypoints; a cubic's peak exceeds the largest sample by at most 0.2 %
-MARGIN = 2e-3  # fraction of the limits
+GRID_POINTS = 20  # per segment between two waypoints
+MIN_DISTANCE = 1e-6  # [rad or m]; closer waypoints are merged
+SAMPLES = 64  # per segment; the peak of a cubic exceeds the largest sample by at most 0.2 %
+MARGIN = 2e-3  # safety margin, as a fraction of the limits
 BOUND_TOLERANCE = 1e-4  # [rad or m]
 
 
@@ -48,7 +48,7 @@ def unwound(points: Any, continuous: Any) -> Any:
 def distinct(points: Any) -> Any:
     """Returns the indices of the waypoints that differ from their predecessor."""
     array = np.asarray(points, dtype=float)
-    moved = np.linalg.norm(np.diff(array, axis=0), axis=1) > SAME_POINT
+    moved = np.linalg.norm(np.diff(array, axis=0), axis=1) > MIN_DISTANCE
     return np.concatenate([[0], 1 + np.flatnonzero(moved)])
 
 
@@ -62,15 +62,16 @@ class Timing:
 
 
 def retime(points: Any, limits: Limits) -> Timing:
-    """Returns a fast timing of the waypoints with rest at both ends and times in whole nanoseconds.
+    """Returns fast times for waypoints; the motion starts and ends at rest. Times are rounded to nanoseconds.
 
-    TOPP-RA times a cubic spline through the waypoints. Its accelerations are discontinuous, unlike those of quintics
-    between the waypoints, so the timing is slowed uniformly until the quintics keep the limits. If the spline
-    exceeds a bound, or is slower than stopping at all waypoints, a monotone spline is tried, then these stops.
+    TOPP-RA computes the times of a cubic spline through the waypoints. Controllers interpolate with quintics instead,
+    which have continuous accelerations. Therefore the motion is slowed uniformly until the quintics satisfy the limits.
+    If the spline exceeds a bound, or takes longer than a motion that stops at all waypoints, a monotone spline is used.
+    If the monotone spline has the same problem, the motion stops at all waypoints.
 
     Args:
         points: Waypoints, shape (n >= 2, joints) [rad or m], each different from its predecessor.
-        limits: Joint limits; bounds apply only as far as the waypoints keep them.
+        limits: Joint limits; position bounds are widened to include all waypoints.
 
     Raises:
         MoveItCommanderException: A velocity or acceleration limit is not above 0.
@@ -150,9 +151,9 @@ def _time_optimal_timing(is_monotone: bool, points: Any, limits: Limits) -> Timi
         return None
     steps = 2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])
     times = np.concatenate([[0.0], np.cumsum(steps)])
-    changes = np.diff(speeds) / steps  # constant between two grid points
+    path_accelerations = np.diff(speeds) / steps  # constant between two grid points
     knot_indices = np.arange(len(knots)) * GRID_POINTS
     tangents, curvatures = path(knots, 1), path(knots, 2)
-    change = changes[np.minimum(knot_indices, len(changes) - 1)]
-    accelerations = tangents * change[:, None] + curvatures * (speeds[knot_indices] ** 2)[:, None]
+    knot_accelerations = path_accelerations[np.minimum(knot_indices, len(path_accelerations) - 1)]
+    accelerations = tangents * knot_accelerations[:, None] + curvatures * (speeds[knot_indices] ** 2)[:, None]
     return Timing(times[knot_indices], tangents * speeds[knot_indices, None], accelerations)

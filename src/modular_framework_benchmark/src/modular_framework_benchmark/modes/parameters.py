@@ -10,7 +10,7 @@ from modular_framework_benchmark.modes.errors import ModeError
 
 
 def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> dict[str, Any]:
-    """Returns parameters relative to a parent, nested where a name has slashes.
+    """Returns the parameters below their parents as nested dictionaries.
 
     Args:
         parameters: Values by full name, such as `/move_group/planner_configs/RRTConnect/range`.
@@ -21,12 +21,12 @@ def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> d
     """
     result: dict[str, Any] = {}
     for name, value in parameters.items():
-        fitting = [parent for parent in parents if name.startswith(parent)]
-        if not fitting:
+        matching = [parent for parent in parents if name.startswith(parent)]
+        if not matching:
             raise ModeError(
                 f"parameter '{name}' has no effect in this mode; allowed: names below {' and '.join(parents)}"
             )
-        *path, last = name.removeprefix(max(fitting, key=len)).split("/")
+        *path, last = name.removeprefix(max(matching, key=len)).split("/")
         inner = result
         for part in path:
             inner = inner.setdefault(part, {})

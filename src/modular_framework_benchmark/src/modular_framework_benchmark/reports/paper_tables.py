@@ -7,22 +7,22 @@ import re
 
 from modular_framework_benchmark.reports.tables import Cell, Table
 
-_LATEX = {
+_LATEX_ESCAPES = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
     "|": r"\textbar{}", '"': "''", "–": "--", "−": "$-$", "↑": r"$\uparrow$", "↓": r"$\downarrow$",
     "…": r"\dots{}", "±": r"$\pm$", "°": r"\textdegree{}", "µ": r"\textmu{}", "²": r"\textsuperscript{2}",
     "\u00a0": "~", "\n": " ", "\r": " ", "\t": " ",
 }  # fmt: skip
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#~&$])")
+_MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]<>|#~&$])")
 
 
 def markdown_table(table: Table) -> str:
     """Returns a table in GitHub's Markdown, with the caption above and the notes below."""
     lines = [markdown_text(table.caption), ""]
     lines.append("| " + " | ".join(markdown_text(title) for title in table.columns) + " |")
-    numbers = [_is_number(table, column) for column in range(len(table.columns))]
-    lines.append("|" + "|".join("---:" if number else "---" for number in numbers) + "|")
+    is_numeric = [_is_number(table, column) for column in range(len(table.columns))]
+    lines.append("|" + "|".join("---:" if numeric else "---" for numeric in is_numeric) + "|")
     lines += ["| " + " | ".join(_markdown_cell(cell) for cell in row) + " |" for row in table.rows]
     for note in table.notes:
         lines += ["", markdown_text(note)]
@@ -54,13 +54,15 @@ def latex_table(table: Table) -> str:
 
 
 def latex_text(text: str) -> str:
-    """Returns a text that LaTeX prints literally."""
-    return "".join(_LATEX.get(letter, letter) for letter in text if letter.isprintable() or letter in _LATEX)
+    """Escapes a text for LaTeX."""
+    return "".join(
+        _LATEX_ESCAPES.get(letter, letter) for letter in text if letter.isprintable() or letter in _LATEX_ESCAPES
+    )
 
 
 def markdown_text(text: str) -> str:
-    """Returns a text that Markdown displays literally, on one line."""
-    return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
+    """Escapes a text for Markdown and joins its lines."""
+    return _MARKDOWN_SPECIAL.sub(r"\\\1", " ".join(text.split()))
 
 
 def _is_number(table: Table, column: int) -> bool:

@@ -41,8 +41,8 @@ def image_statistics(images: NDArray[np.uint8]) -> FeatureStatistics:
     Returns:
         Statistics as in `feature_statistics`, of shape (3, 1, 1); `count` is the number of images.
     """
-    found = feature_statistics(images.reshape(-1, 3) / 255.0)
-    shaped = {name: value.reshape(3, 1, 1) for name, value in found.items() if name != "count"}
+    statistics = feature_statistics(images.reshape(-1, 3) / 255.0)
+    shaped = {name: value.reshape(3, 1, 1) for name, value in statistics.items() if name != "count"}
     return {**shaped, "count": np.array([len(images)])}
 
 
@@ -72,4 +72,4 @@ def joined_statistics(parts: Sequence[FeatureStatistics]) -> FeatureStatistics:
 
 def as_lists(statistics: Mapping[str, FeatureStatistics]) -> dict[str, dict[str, list[object]]]:
     """Returns statistics as nested lists, for JSON."""
-    return {feature: {name: value.tolist() for name, value in found.items()} for feature, found in statistics.items()}
+    return {feature: {name: value.tolist() for name, value in item.items()} for feature, item in statistics.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares two methods for a metric before the multiplicity correction: test and interval of the win difference.
+"""Compares two methods on a metric by the win difference, before the multiplicity correction.
 
 The win difference decides the direction, the p value and the interval of every metric. Sources: S. J.
 Pocock and others, The win ratio, European Heart J. 33 (2012) 176-182; R. Agarwal and others, NeurIPS 2021.
@@ -28,7 +28,7 @@ class Finding(PairFigures):
         discordance: Mean square of the units' win differences; with one pair per unit it is the fraction of discordant
             pairs. The sample size depends on it. None without data.
         min_attainable_p: Minimum attainable p value with this number of discordant units; 0 for an anytime-valid test.
-        without_broken: Comparison without the pairs of broken episodes; None without such pairs.
+        without_broken: Comparison that excludes pairs with a broken episode; None if no episode is broken.
     """
 
     metric: Metric
@@ -97,7 +97,7 @@ def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Findin
 
 
 def _coarser_units(matched: Pairs) -> Integers:
-    """Returns the coarser partition into units; the partners of random pairs have different units."""
+    """Returns the unit ids of the method with fewer units; the ids of two methods differ only for random pairs."""
     return min(matched.first.units, matched.second.units, key=lambda partition: len(np.unique(partition)))
 
 
@@ -136,7 +136,7 @@ def _point_estimate(scores: Floats, metric: Metric) -> float:
 
 
 def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Estimate | None:
-    """Returns the mean difference of the pairs with two values; it is descriptive only."""
+    """Returns the mean difference over the pairs with two known values; descriptive only."""
     differences = matched.first.values - matched.second.values
     known = ~np.isnan(differences)
     if metric.kind is MetricKind.RATE or not known.any():

@@ -3,7 +3,7 @@
 
 `init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
 control loop and must not block. Start threads and processes in `init`, because a thread started in the control loop
-inherits the loop's priority. A controller uses only the time passed to these methods, so that it behaves equally under
+inherits the loop's priority. A controller uses only the time passed to these methods, so that it behaves the same in
 simulated and real time.
 """
 
@@ -28,10 +28,10 @@ class Controller:
 
     Attributes:
         interface_class: Hardware interface of the controller.
-        robot_hw: Hardware, set before `init`, for controllers that need further interfaces; handles that `init` gets
-            from any interface are claimed for the controller.
-        pids: PIDs, set by `init`; the keys are the namespaces of the gains below the controller's name, where the gains
-            can be changed at runtime.
+        robot_hw: Hardware, set before `init`, for controllers that need additional interfaces. All handles that `init`
+            gets are claimed for the controller.
+        pids: PIDs, set by `init`, by the namespace of their gains relative to the controller. The gains can be changed
+            at runtime.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]]
@@ -40,7 +40,7 @@ class Controller:
 
     @property
     def moving(self) -> bool:
-        """Whether the controller executes a goal or brings joints to rest, for which simulated time must pass."""
+        """Whether the controller executes a goal or stops joints; simulated time must not be paused meanwhile."""
         return False
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -78,7 +78,7 @@ class Controller:
         """Runs once after the last update before a stop."""
 
     def interrupted(self, time_s: float, reason: str) -> None:
-        """Runs instead of `stopping` before an immediate restart; `reason` is for the results of goals."""
+        """Runs instead of `stopping` before an immediate restart; results of active goals contain `reason`."""
         del reason
         self.stopping(time_s)
 
@@ -90,14 +90,14 @@ class Controller:
 
         Args:
             time_s: Time of this cycle.
-            reason: Reason for the results of goals.
+            reason: Reason, for the results of active goals.
         """
 
     def on_hardware_recovered(self, time_s: float) -> None:
         """Runs once when a hardware fault ends; holds the measured positions, because the joints may have moved."""
 
     def failed(self, time_s: float, reason: str) -> None:
-        """Runs instead of `stopping` if the controller raised; `reason` is for the results of goals."""
+        """Runs instead of `stopping` if the controller raised; results of active goals contain `reason`."""
         del reason
         self.stopping(time_s)
 

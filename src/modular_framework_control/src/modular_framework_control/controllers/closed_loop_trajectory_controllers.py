@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectory controllers that close the position loop of velocity- or effort-controlled joints by a PID."""
+"""Trajectory controllers that close the position loop of velocity- or effort-controlled joints with a PID."""
 
 from __future__ import annotations
 

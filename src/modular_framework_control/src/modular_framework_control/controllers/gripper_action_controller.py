@@ -17,7 +17,7 @@ from modular_framework_control.controller_interface.pid import PidGains
 from modular_framework_control.controllers.joint_command_controllers import JointControlSnapshot
 from modular_framework_control.hardware_interface.handles import JointHandle, unmeasured
 from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
-from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN
+from modular_framework_control.hardware_interface.joint_limit_parameters import GOAL_TOLERANCE
 from modular_framework_control.hardware_interface.joint_limits import limits_of
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.realtime.mailbox import Mailbox
@@ -135,8 +135,8 @@ class GripperActionController(Controller):
             )
         min_position, max_position = self._limits.range_from(self._handle.position)
         if (
-            position < max(min_position, -MAX_VALUE) - POINT_MARGIN
-            or position > min(max_position, MAX_VALUE) + POINT_MARGIN
+            position < max(min_position, -MAX_VALUE) - GOAL_TOLERANCE
+            or position > min(max_position, MAX_VALUE) + GOAL_TOLERANCE
         ):
             raise GripperGoalError(
                 f"position of joint '{self._handle.name}' is {position:.6g}; its limits are "

@@ -19,10 +19,10 @@ from modular_framework_urdf.robot import Joint, SafetyController
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
-POINT_MARGIN = 1e-3
-"""Tolerance of goals beyond a position limit [rad|m], for rounding of angles."""
-MEASURED_FRACTION, MEASURED_MARGIN = 0.01, 0.01
-"""Accuracy of measured positions at limits, as a fraction of the range and [rad|m]; the smaller value applies."""
+GOAL_TOLERANCE = 1e-3
+"""Tolerance for goals beyond a position limit [rad|m]; covers rounded angles."""
+MEASUREMENT_FRACTION, MEASUREMENT_TOLERANCE = 0.01, 0.01
+"""Tolerance for measured positions beyond a limit: fraction of the range, and [rad|m]; the smaller value applies."""
 SOFT_LIMIT_KEYS = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
 
 
@@ -51,20 +51,20 @@ class JointLimits:
         return min(self.min_position, position), max(self.max_position, position)
 
     def is_beyond(self, position: float) -> bool:
-        """Returns whether a measured `position` [rad|m] is outside the range by more than the accuracy of hardware."""
-        margin = min(MEASURED_MARGIN, MEASURED_FRACTION * (self.max_position - self.min_position))
-        return position < self.min_position - margin or position > self.max_position + margin
+        """Returns whether a measured `position` [rad|m] is outside the range by more than the measurement tolerance."""
+        tolerance = min(MEASUREMENT_TOLERANCE, MEASUREMENT_FRACTION * (self.max_position - self.min_position))
+        return position < self.min_position - tolerance or position > self.max_position + tolerance
 
 
 @dataclass(frozen=True, slots=True)
 class SoftJointLimits:
-    """A range inside the limits, whose ends a joint approaches at decreasing speed.
+    """Soft position limits, which a joint approaches at decreasing speed.
 
     Attributes:
         min_position: Minimum position [rad|m].
         max_position: Maximum position [rad|m].
-        k_position: Allowed velocity per distance to the end of the range [1/s].
-        k_velocity: Allowed effort per difference to this velocity [Nm s/rad|N s/m].
+        k_position: Velocity limit per distance to the soft limit [1/s].
+        k_velocity: Effort limit per difference between the velocity and its limit [Nm s/rad|N s/m].
     """
 
     min_position: float
@@ -128,7 +128,7 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
         ParameterError: A value has the wrong type, or the range is empty.
     """
     handle = root_nh.child(f"joint_limits/{name}")
-    bounds = _complete(handle, "has_position_limits", ("min_position", "max_position"))
+    bounds = _read_group(handle, "has_position_limits", ("min_position", "max_position"))
     if bounds is not None:
         limits = replace(limits, min_position=bounds[0], max_position=bounds[1])
     elif _flag(handle, "has_position_limits") is False:
@@ -141,9 +141,9 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
         )
     return replace(
         limits,
-        max_velocity=_maximum(handle, "velocity", limits.max_velocity),
-        max_acceleration=_maximum(handle, "acceleration", limits.max_acceleration),
-        max_effort=_maximum(handle, "effort", limits.max_effort),
+        max_velocity=_read_max(handle, "velocity", limits.max_velocity),
+        max_acceleration=_read_max(handle, "acceleration", limits.max_acceleration),
+        max_effort=_read_max(handle, "effort", limits.max_effort),
     )
 
 
@@ -151,14 +151,16 @@ def _flag(handle: NodeHandle, key: str) -> bool | None:
     return read_bool(handle, key, False) if handle.has_param(key) else None
 
 
-def _complete(handle: NodeHandle, flag: str, keys: tuple[str, ...], minimum: float | None = None) -> list[float] | None:
-    """Returns the values of `keys` if `has` is true and all are set; else None, with a warning if some are set."""
+def _read_group(
+    handle: NodeHandle, flag: str, keys: tuple[str, ...], minimum: float | None = None
+) -> list[float] | None:
+    """Returns the values of `keys` if `flag` is true and all are set; else None, with a warning for ignored keys."""
     present = [key for key in keys if handle.has_param(key)]
     if _flag(handle, flag):
         if len(present) == len(keys):
             return [read_number(handle, key, 0.0, minimum) for key in keys]
         LOGGER.warning(
-            "parameters %s: %s is true, but of %s only %s are set and ignored; set all of them",
+            "parameters %s: %s is true, but the group %s is incomplete (set: %s) and ignored; set all of them",
             handle.namespace,
             flag,
             ", ".join(keys),
@@ -166,13 +168,16 @@ def _complete(handle: NodeHandle, flag: str, keys: tuple[str, ...], minimum: flo
         )
     elif present and not handle.has_param(flag):
         LOGGER.warning(
-            "parameters %s: %s without %s: true are ignored; set it", handle.namespace, ", ".join(present), flag
+            "parameters %s: ignoring %s, because %s is not set; set it to true",
+            handle.namespace,
+            ", ".join(present),
+            flag,
         )
     return None
 
 
-def _maximum(handle: NodeHandle, quantity: str, default: float) -> float:
-    values = _complete(handle, f"has_{quantity}_limits", (f"max_{quantity}",), 0.0)
+def _read_max(handle: NodeHandle, quantity: str, default: float) -> float:
+    values = _read_group(handle, f"has_{quantity}_limits", (f"max_{quantity}",), 0.0)
     if values is not None:
         return values[0]
     return INFINITY if _flag(handle, f"has_{quantity}_limits") is False else default
@@ -192,7 +197,7 @@ def soft_limits_with_parameters(
         ParameterError: A value is not a number or negative, or the range is empty.
     """
     handle = root_nh.child(f"joint_limits/{name}")
-    values = _complete(handle, "has_soft_limits", SOFT_LIMIT_KEYS)
+    values = _read_group(handle, "has_soft_limits", SOFT_LIMIT_KEYS)
     if values is None:
         return limits
     lower, upper, k_position, k_velocity = values

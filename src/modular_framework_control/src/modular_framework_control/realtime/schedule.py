@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Schedule of periodic work in the time of the control loop."""
+"""Schedule of periodic work on the clock of the control loop."""
 
 from __future__ import annotations
 
 import math
 
-SAME_TIME_S = 1e-6
+TIME_TOLERANCE_S = 1e-6
 """Tolerance of time comparisons [s], because sums of periods are inexact."""
 
 
@@ -27,8 +27,8 @@ class Schedule:
 
     def take_if_due(self, time_s: float) -> bool:
         """Returns whether a deadline has passed at `time_s`; if so, the next deadline is one period later."""
-        if time_s < self._next_s - SAME_TIME_S:
+        if time_s < self._next_s - TIME_TOLERANCE_S:
             return False
         following_s = self._next_s + self._period_s
-        self._next_s = following_s if following_s > time_s + SAME_TIME_S else time_s + self._period_s
+        self._next_s = following_s if following_s > time_s + TIME_TOLERANCE_S else time_s + self._period_s
         return True

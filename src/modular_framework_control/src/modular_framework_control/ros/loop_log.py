@@ -23,14 +23,14 @@ class LoopLog(logging.Handler):
         self._logger = logging.getLogger(ROSOUT)
         self._former_handlers: list[logging.Handler] | None = None
         self._formerly_propagated = True
-        self._complaining_thread: int | None = None
+        self._error_thread: int | None = None
 
     def createLock(self) -> None:  # noqa: N802  # the name is logging's
         """Creates no lock: the loop must never wait for another thread."""
         self.lock = None
 
     def begin(self) -> None:
-        """Takes over the records from now on, unless another LoopLog already does."""
+        """Replaces the handlers of rospy's logger, unless another LoopLog has replaced them."""
         if any(isinstance(handler, LoopLog) for handler in self._logger.handlers):
             return
         self._outbox.start()
@@ -39,12 +39,12 @@ class LoopLog(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queues the record with its text formatted now, as the arguments may change later."""
-        if threading.get_ident() == self._complaining_thread:
+        if threading.get_ident() == self._error_thread:
             return
         try:
             record.msg, record.args = record.getMessage(), None
         except Exception:  # a wrong format string must not end the loop
-            self._complain(self, record)
+            self._print_error(self, record)
             return
         self._outbox.put(self._write, record)
 
@@ -62,14 +62,14 @@ class LoopLog(logging.Handler):
         try:
             pass_record(record)
         except Exception:
-            self._complain(handler, record)
+            self._print_error(handler, record)
 
-    def _complain(self, handler: logging.Handler, record: logging.LogRecord) -> None:
+    def _print_error(self, handler: logging.Handler, record: logging.LogRecord) -> None:
         """Prints an error of a handler to standard error, as the logging module does."""
-        self._complaining_thread = threading.get_ident()
+        self._error_thread = threading.get_ident()
         with contextlib.suppress(Exception):
             handler.handleError(record)
-        self._complaining_thread = None
+        self._error_thread = None
 
     def flush(self) -> None:
         """Waits until the records queued so far are written."""

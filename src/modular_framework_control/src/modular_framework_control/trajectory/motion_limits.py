@@ -15,7 +15,7 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN, JointLimits
+from modular_framework_control.hardware_interface.joint_limit_parameters import GOAL_TOLERANCE, JointLimits
 from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track, chunks
 
 MAX_VELOCITY_FACTOR = 1.05
@@ -191,7 +191,9 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
     limits = limits.with_positions(measured)
     for chunk in chunks(len(spline.times_s)):
         positions, velocities = spline.states[chunk, POSITION], spline.states[chunk, VELOCITY]
-        beyond = (positions < limits.min_positions - POINT_MARGIN) | (positions > limits.max_positions + POINT_MARGIN)
+        beyond = (positions < limits.min_positions - GOAL_TOLERANCE) | (
+            positions > limits.max_positions + GOAL_TOLERANCE
+        )
         found.add(_Kind.POINT_POSITION, positions, beyond, chunk.start)
         found.add(
             _Kind.POINT_VELOCITY,

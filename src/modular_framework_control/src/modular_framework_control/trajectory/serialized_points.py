@@ -15,7 +15,7 @@ import numpy as np
 from modular_framework_control.trajectory.joint_trajectory import TrajectoryPoints, chunks
 
 _U32 = struct.Struct("<I")
-_KINDS = ("positions", "velocities", "accelerations", "effort")
+_FIELDS = ("positions", "velocities", "accelerations", "effort")
 _EMPTY_POINT_BYTES = 24  # four sizes and a duration
 
 Buffer = bytes | bytearray | memoryview
@@ -27,7 +27,7 @@ def read_points(data: Buffer, offset: int, joints: int) -> tuple[TrajectoryPoint
 
     Args:
         data: Serialized message.
-        offset: Offset of the array, which begins with the number of points [bytes].
+        offset: Offset of the array's length field [bytes].
         joints: Number of joint names.
 
     Returns:
@@ -54,9 +54,9 @@ def read_points(data: Buffer, offset: int, joints: int) -> tuple[TrajectoryPoint
 
 
 def _sizes_at(data: Buffer, offset: int) -> Sizes:
-    """Returns the counts of the four kinds of values of the point at `offset`."""
+    """Returns the lengths of the four value arrays of the point at `offset`."""
     sizes = []
-    for _ in _KINDS:
+    for _ in _FIELDS:
         (size,) = _U32.unpack_from(data, offset)
         sizes.append(size)
         offset += 4 + 8 * size
@@ -64,12 +64,12 @@ def _sizes_at(data: Buffer, offset: int) -> Sizes:
 
 
 def _equal_sized(data: Buffer, offset: int, sizes: Sizes, max_points: int) -> np.ndarray:
-    """Returns a view of the points from `offset` on that have these sizes, at most `at_most` points."""
-    fit = min(max_points, (len(data) - offset) // (_EMPTY_POINT_BYTES + 8 * sum(sizes)))
-    if fit < 1:
+    """Returns a view of the leading points at `offset` whose arrays have these lengths, at most `max_points` points."""
+    count = min(max_points, (len(data) - offset) // (_EMPTY_POINT_BYTES + 8 * sum(sizes)))
+    if count < 1:
         raise struct.error(f"the point at byte {offset} is longer than the message")
-    block = np.frombuffer(data, _layout(sizes), fit, offset)
-    is_equal_sized = np.all([block[f"{kind} size"] == size for kind, size in zip(_KINDS, sizes, strict=True)], axis=0)
+    block = np.frombuffer(data, _layout(sizes), count, offset)
+    is_equal_sized = np.all([block[f"{kind} size"] == size for kind, size in zip(_FIELDS, sizes, strict=True)], axis=0)
     return block if is_equal_sized.all() else block[: int(is_equal_sized.argmin())]
 
 
@@ -77,7 +77,7 @@ def _equal_sized(data: Buffer, offset: int, sizes: Sizes, max_points: int) -> np
 def _layout(sizes: Sizes) -> np.dtype[np.void]:
     """Returns the memory layout of a point."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    for kind, size in zip(_KINDS, sizes, strict=True):
+    for kind, size in zip(_FIELDS, sizes, strict=True):
         fields += [(f"{kind} size", "<u4"), (kind, "<f8", (size,))]
     return np.dtype([*fields, ("secs", "<i4"), ("nsecs", "<i4")])
 
@@ -85,6 +85,6 @@ def _layout(sizes: Sizes) -> np.dtype[np.void]:
 def _store(points: TrajectoryPoints, rows: slice, block: np.ndarray, sizes: Sizes, columns_used: int) -> None:
     points.times_s[rows] = block["secs"] + block["nsecs"] / 1e9
     points.counts[rows] = np.minimum(sizes[:3], np.iinfo(np.int32).max)
-    for row, (kind, size) in enumerate(zip(_KINDS[:3], sizes[:3], strict=True)):
+    for row, (kind, size) in enumerate(zip(_FIELDS[:3], sizes[:3], strict=True)):
         columns = min(size, columns_used)
         points.values[rows, row, :columns] = block[kind][:, :columns]

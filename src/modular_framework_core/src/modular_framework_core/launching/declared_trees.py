@@ -20,7 +20,7 @@ class _Pattern:
 
 
 def tree_fault(name: str, value: Any, below: NodeDeclaration, robot: Mapping[str, Collection[str]]) -> str:
-    """Returns the fault of a nested parameter as the predicate of a sentence about its name; "" if valid.
+    """Returns the error text for a nested parameter, which follows the parameter name in messages; "" if valid.
 
     Args:
         name: Name relative to the tree, such as `elbow_joint/max_velocity`.

@@ -52,7 +52,7 @@ class MachineSpec:
         states: Child states and machines, in order.
         transitions: Outcome -> label or outcome of the enclosing machine; empty for the root and in a concurrence.
         shares_userdata: Whether the machine uses the enclosing machine's userdata.
-        default_outcome: Outcome of a concurrence if no entry of the outcome map matches; else None.
+        default_outcome: Outcome of a concurrence if no entry of the outcome map matches; None for other machines.
         outcome_map: For a concurrence, outcome -> {label: outcome of that child}.
         input_keys: Userdata keys copied from the enclosing machine.
         output_keys: Userdata keys copied to the enclosing machine.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Emulates a Dynamixel MX-64 on a serial line: packets of protocol 1.0, and the control table with the registers.
+"""Emulates a Dynamixel MX-64 on a serial line: protocol 1.0 packets and the control table.
 
 The motor model (`dynamixel_finger`) reads the goals from the registers, and writes the measured values to registers.
 """
@@ -16,7 +16,7 @@ PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, SYNC_WRITE, BULK_READ = 1, 
 BROADCAST = 0xFE
 HEADER = b"\xff\xff"
 CONTROL_TABLE_SIZE = 74
-POSITION_RANGE = 28672
+MULTI_TURN_RANGE = 28672
 FACTORY_VALUES = {
     mx64.MODEL_NUMBER: mx64.MODEL_NUMBER_MX64,
     mx64.FIRMWARE_VERSION: 41,
@@ -186,7 +186,7 @@ class DynamixelServo:
         self.errors, self._registered_write = ServoErrors.NONE, None
 
     def shut_down(self, errors: ServoErrors) -> None:
-        """Adds errors of the motor; errors in the shutdown register set the torque limit to 0."""
+        """Adds error flags; a flag that is enabled in the shutdown register also sets the torque limit to 0."""
         self.errors |= errors
         if errors & self.get(mx64.SHUTDOWN):
             self.set(mx64.TORQUE_LIMIT, 0)
@@ -237,7 +237,7 @@ class DynamixelServo:
         return packet(self.servo_id, int(errors | self.errors), data)
 
     def _write(self, parameters: bytes) -> ServoErrors:
-        """Writes data at the address in parameters[0]; with an error, all registers keep their values."""
+        """Writes data at the address in parameters[0]; on an error, no register changes."""
         address, data = parameters[0], parameters[1:]
         addresses = range(address, address + len(data))
         if addresses.stop > CONTROL_TABLE_SIZE or READ_ONLY & set(addresses):
@@ -269,13 +269,13 @@ class DynamixelServo:
     def _is_goal_allowed(self) -> bool:
         goal = self.get(mx64.GOAL_POSITION)
         if self.multi_turn:
-            return abs(mx64.signed(goal)) <= POSITION_RANGE
+            return abs(mx64.signed(goal)) <= MULTI_TURN_RANGE
         low, high = self.get(mx64.CW_ANGLE_LIMIT), self.get(mx64.CCW_ANGLE_LIMIT)
         return low <= goal <= high or low == high == 0
 
 
 def bus_response(servos: Iterable[DynamixelServo], instruction: Instruction) -> bytes:
-    """Returns the status packets of the servos on a line for an instruction, in the order of the servos."""
+    """Returns the status packets of all addressed servos on the bus, in the order of `servos`."""
     all_servos = list(servos)
     if instruction.kind == SYNC_WRITE and instruction.servo_id == BROADCAST:
         if instruction.checksum_valid and len(instruction.parameters) > 2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs an emulated UR controller for tests and measurements in a separate process with its own loopback address."""
+"""Runs an emulated UR controller in a separate process with its own loopback address, for tests and benchmarks."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class EmulatedArm:
     """
 
     def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0, positions: Sequence[float] = HOME) -> None:
-        draw = random.Random(os.urandom(8))  # 127.x.y.z is this machine; concurrent tests draw other addresses
-        self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+        generator = random.Random(os.urandom(8))  # 127.x.y.z is this machine; concurrent tests use different addresses
+        self.address = f"127.{generator.randint(16, 254)}.{generator.randint(0, 254)}.{generator.randint(1, 254)}"
         self._process = subprocess.Popen(
             [
                 sys.executable,
@@ -60,7 +60,7 @@ class EmulatedArm:
         return send_command(COMMAND_PORT, command, self.address, **arguments)
 
     def state(self) -> dict[str, str]:
-        """Returns the values of the command `state`, by name."""
+        """Returns the response to the command `state` as a dictionary."""
         return dict(pair.split("=") for pair in self.command("state").split())
 
     def positions(self) -> list[float]:

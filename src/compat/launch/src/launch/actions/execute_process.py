@@ -25,7 +25,7 @@ OUTPUTS = {"screen": True, "both": True, "full": True, "log": False, "own_log": 
 DEFAULT_TIMEOUTS_S = {"sigterm_timeout": 15.0, "sigkill_timeout": 5.0}
 """Times from SIGINT to SIGTERM, as in roslaunch, and from SIGTERM to SIGKILL [s]."""
 UNSUPPORTED = ("emulate_tty", "output_format", "cached_output", "log_cmd")
-"""Options of ROS 2 for the output of processes; accepted without effect, because processes write their own output."""
+"""ROS 2 options of the process output; accepted and ignored, because processes write their own output."""
 
 
 class ExecuteLocal(Action):
@@ -35,7 +35,7 @@ class ExecuteLocal(Action):
         cmd: Program and arguments; each element may be a sequence of substitutions, which is concatenated.
         prefix: Prefix of the command, such as a debugger; the default is the configuration `launch-prefix`.
         name: Name of the process in messages; the default is the name of the program.
-        cwd: Working folder; the default is the folder of the launch.
+        cwd: Working directory; the default is the directory of the launch.
         env: Complete environment.
         additional_env: Additional environment variables.
         shell: Whether a shell executes the command.
@@ -57,7 +57,9 @@ class ExecuteLocal(Action):
     ) -> None:
         super().__init__(condition=options.pop("condition", None))
         if isinstance(cmd, str | Substitution):
-            raise TypeError(f"{self.where}: cmd is a single text; allowed: a list of program and arguments, cmd=[...]")
+            raise TypeError(
+                f"{self.where}: cmd is a single string; allowed: a list of program and arguments, cmd=[...]"
+            )
         self._cmd = [normalize_to_list_of_substitutions(part) for part in cmd]
         self._prefix, self._name, self._cwd = prefix, name, cwd
         self._env, self._additional_env, self._shell = env, dict(additional_env or {}), shell
@@ -104,8 +106,8 @@ class ExecuteLocal(Action):
     def prefix_of(self, context: LaunchContext, program: str) -> list[str]:
         """Returns the prefix of the command."""
         prefix = self._prefix if self._prefix is not None else LaunchConfiguration("launch-prefix", default="")
-        only = perform_text(context, LaunchConfiguration("launch-prefix-filter", default=""))
-        if self._prefix is None and only and not re.match(only, os.path.basename(program)):
+        pattern = perform_text(context, LaunchConfiguration("launch-prefix-filter", default=""))
+        if self._prefix is None and pattern and not re.match(pattern, os.path.basename(program)):
             return []
         return shlex.split(perform_text(context, prefix))
 
