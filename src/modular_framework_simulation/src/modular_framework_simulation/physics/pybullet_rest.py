@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which bodies PyBullet leaves out of its steps because they lie still, and what makes it compute them again.
+"""Sleeping bodies in PyBullet: the engine does not compute bodies at rest until they are woken.
 
-The engine lets a body rest that was slow for two seconds, and wakes it when a moving body touches it. What it does not
-notice is handled here:
+The engine puts a body to sleep that was slow for two seconds, and wakes the body if a moving body touches it. This
+module handles the events that the engine does not detect:
 
-- A body that a hand has held still for two seconds would stay in the air when the hand opens: in the step in which the
-  contact ends it has no velocity yet. So whatever touches a body with joints is woken now and then.
-- Bodies that touch one that a request moves or takes away are woken by `wake_touching`, bodies in the place where a
-  static body is put by `wake_near`. Another gravity wakes everything (`wake_all`).
-- A body wakes at the end of a step, in which a new velocity and forces are lost; they are given again after it.
-- The load on a joint of a body at rest would read zero, so a body in which one is measured never rests.
+- A body that a hand has held at rest would keep sleeping in the air after the hand opens, because its velocity is still
+  0 when the contact ends. Therefore all bodies in contact with a body with joints are woken periodically.
+- If a request moves or removes a body, `wake_touching` wakes the bodies in contact with it. If a static body is placed,
+  `wake_near` wakes the bodies at this place. A change of gravity wakes all bodies (`wake_all`).
+- A body wakes at the end of a step. A velocity or force of this step is lost and is therefore applied again afterwards.
+- A joint load of a sleeping body would read 0, so a body with a measured joint load never sleeps.
 
-Bodies that never move rest from the start; the engine would otherwise compute their contacts with everything on them.
+Static bodies always sleep; otherwise the engine would compute their contacts with all resting bodies.
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ from modular_framework_simulation.physics.physics_engine import BASE_INDEX, REST
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 
 _REST_AFTER_S = 2.0
-"""How long a body is slow before it rests; fixed in the engine [s]."""
-_LOOK_S = 0.5
-"""How often what touches bodies with joints is woken [s of simulated time]."""
+"""Time at low speed after which the engine puts a body to sleep; fixed in the engine [s]."""
+_WAKE_PERIOD_S = 0.5
+"""Period for waking the bodies in contact with bodies with joints [s of simulated time]."""
 
 
 class Rest:
-    """The bodies of one connection to the engine that may rest: those without joints that are not fixed.
+    """Sleeping bodies of a connection to the engine. Movable bodies without joints and static bodies can sleep.
 
     Args:
-        api: The module pybullet.
-        client: The connection.
-        settings: Numbers of the engine.
+        api: Module pybullet.
+        client: Id of the connection.
+        settings: Physics settings.
     """
 
     def __init__(self, api: Any, client: int, settings: PhysicsSettings) -> None:
         self._api, self._client, self._settings = api, client, settings
-        self._woken: dict[int, int] = {}  # bodies that may rest, and the step in which each was woken last
+        self._woken: dict[int, int] = {}  # movable bodies that can sleep, with the step of the last wake-up
         self._jointed: list[int] = []
         self._never_move: set[int] = set()
-        self._slept: set[int] = set()  # at the last look
-        self._known: set[int] = set()  # at the last two looks
+        self._slept: set[int] = set()  # asleep at the last check
+        self._known: set[int] = set()  # asleep at the last two checks
         self._steps = 0
         self._waking: set[int] = set()
         self._lost: list[tuple[int, Callable[[], None]]] = []
 
     def adjust(self, settings: PhysicsSettings) -> None:
-        """Continues with other settings."""
+        """Applies new settings."""
         self._settings = settings
         self.wake_all()
 
@@ -57,9 +57,9 @@ class Rest:
         """Adds a new body.
 
         Args:
-            body: Number of the body in the engine.
+            body: Engine id of the body.
             fixed: Whether the body is fixed to the world.
-            has_joints: Whether the body has joints; such a body never rests.
+            has_joints: Whether the body has joints; such a body never sleeps.
         """
         if has_joints:
             self._jointed.append(body)
@@ -71,7 +71,7 @@ class Rest:
             self._change(body, self._api.ACTIVATION_STATE_ENABLE_SLEEPING)
 
     def keep_awake(self, body: int) -> None:
-        """Lets a body never rest."""
+        """Prevents a body from sleeping."""
         if self._woken.pop(body, None) is not None or body in self._never_move:
             for bodies in (self._never_move, self._slept, self._known):
                 bodies.discard(body)
@@ -93,7 +93,7 @@ class Rest:
         )
 
     def wake(self, body: int) -> None:
-        """Lets a body move again; one that always does is left alone."""
+        """Wakes a body; has no effect on bodies that never sleep."""
         if body in self._woken:
             if self._rests(body):
                 self._waking.add(body)
@@ -103,13 +103,13 @@ class Rest:
             self._change(body, self._api.ACTIVATION_STATE_WAKE_UP)
 
     def wake_touching(self, body: int) -> None:
-        """Lets what touched a body in the last step move again: the body is about to be elsewhere."""
+        """Wakes the bodies that touched a body in the last step, because the body is about to move."""
         points = self._api.getContactPoints(bodyA=body, physicsClientId=self._client) if self._woken else ()
         for touched in sorted({point[2] for point in points}):
             self.wake(touched)
 
     def wake_near(self, body: int) -> None:
-        """Lets what a body that never moves is in or beside now move again; other bodies wake what they touch."""
+        """Wakes the bodies that overlap a static body or are close to it; moving bodies wake others by contact."""
         if body not in self._never_move or not self._woken:
             return
         for link in range(BASE_INDEX, self._api.getNumJoints(body, physicsClientId=self._client)):
@@ -120,35 +120,35 @@ class Rest:
 
     @property
     def known(self) -> Collection[int]:
-        """Bodies that never move, and those that have been at rest for at least REST_LOOK_S."""
+        """Static bodies, and bodies that have been asleep for at least REST_LOOK_S."""
         return self._never_move | self._known
 
     def _look(self) -> None:
-        """Looks which bodies rest; what a moving body woke by a touch is noticed here."""
+        """Updates the sleeping bodies; this check detects bodies that the engine has woken by a contact."""
         slept = {body for body in self._woken if self._rests(body)}
         self._known, self._slept = slept & self._slept, slept
 
     def wake_all(self) -> None:
-        """Lets every body move again."""
+        """Wakes all bodies."""
         for body in self._woken:
             self.wake(body)
 
     def _rests(self, body: int) -> bool:
-        """Whether a body rests: the engine gives those no velocity at all."""
+        """Returns whether a body sleeps; the velocities of a sleeping body are exactly 0."""
         if (self._steps - self._woken[body]) * self._settings.time_step_s < _REST_AFTER_S:
             return False
         linear, angular = self._api.getBaseVelocity(body, physicsClientId=self._client)
         return not any(linear) and not any(angular)
 
     def disturb(self, body: int, action: Callable[[], None]) -> None:
-        """Does something to a body, which wakes; what a body at rest would lose is done again after the step."""
+        """Wakes a body and applies an action to it; for a sleeping body, the action is repeated after the step."""
         self.wake(body)
         action()
         if body in self._waking:
             self._lost.append((body, action))
 
     def after_step(self) -> None:
-        """Repeats what bodies that woke in this step lost, and keeps awake what a body with joints touches."""
+        """Repeats lost actions, and wakes the bodies in contact with bodies with joints periodically."""
         self._steps += 1
         for _, action in self._lost:
             action()
@@ -156,6 +156,6 @@ class Rest:
         self._lost.clear()
         if self._steps % round(REST_LOOK_S / self._settings.time_step_s) == 0:
             self._look()
-        if self._steps % round(_LOOK_S / self._settings.time_step_s) == 0:
+        if self._steps % round(_WAKE_PERIOD_S / self._settings.time_step_s) == 0:
             for body in self._jointed:
                 self.wake_touching(body)

@@ -9,19 +9,19 @@ from modular_framework_simulation.physics.physics_engine import PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
 _AT_REST = 1e-9
-"""What is not faster is at rest [m/s, rad/s]: it would be 4 micrometres away after an hour. What engines leave of the
-velocity of a robot that holds still is 1e-13; a held object that creeps by a millimetre an hour has 3e-7."""
-_LOOK_S = 0.1
-"""From one look at the velocities to the next [s of simulated time]."""
+"""Maximum velocity at rest [m/s, rad/s], which moves a body by 4 micrometres per hour. For comparison, the numerical
+residual of a robot that holds its position is 1e-13, and an object that creeps by 1 mm per hour has 3e-7."""
+_CHECK_PERIOD_S = 0.1
+"""Period of the velocity checks [s of simulated time]."""
 
 
 class WorldRest:
-    """Whether a world is at rest: nothing had a velocity after two steps in a row, so nothing accelerates either.
+    """Detects rest of a world: all velocities are 0 after two consecutive steps, so all accelerations are 0 too.
 
-    It stays at rest until `disturb` says that something is done to it: by a force, a command, a change of a model.
+    The world stays at rest until `disturb` reports an external change: a force, a command, or a change of a model.
 
     Args:
-        engine: Of the world.
+        engine: Physics engine of the world.
     """
 
     def __init__(self, engine: PhysicsEngine) -> None:
@@ -32,20 +32,20 @@ class WorldRest:
         """Whether the world is at rest."""
 
     def disturb(self) -> None:
-        """Ends the rest: the coming steps are computed."""
+        """Ends the rest, so that the following steps are computed."""
         self._steps, self._was_still, self.holds = 0, False, False
 
     def after_step(self, bodies: Iterable[SimulatedBody]) -> None:
-        """Looks at the velocities now and then; to be called after every computed step.
+        """Checks the velocities periodically; call this method after every computed step.
 
         Args:
-            bodies: All models.
+            bodies: All models of the world.
         """
         self._steps += 1
-        if self._was_still or self._steps % round(_LOOK_S / self._engine.settings.time_step_s) == 0:
+        if self._was_still or self._steps % round(_CHECK_PERIOD_S / self._engine.settings.time_step_s) == 0:
             resting = self._engine.resting()
             parts = [part for body in bodies for part in body.parts]
-            parts.sort(key=lambda part: part.number in resting)  # what moves is found first
+            parts.sort(key=lambda part: part.number in resting)  # moving bodies first, to end the search early
             still = not any(map(self._moves, parts))
             self.holds = still and self._was_still
             self._was_still = still
