@@ -67,7 +67,7 @@ def test_angles_are_read_as_rosparam_reads_them(tmp_path: Path) -> None:
 def test_an_angle_that_is_no_sum_of_numbers_is_refused_and_not_executed(tmp_path: Path, text: str) -> None:
     path = tmp_path / "angles.yaml"
     path.write_text(f"ok: 1\nangle: {text}\n")
-    with pytest.raises(ParameterFileError, match=r"angles.yaml:2:8: .*is no angle; allowed are numbers, pi"):
+    with pytest.raises(ParameterFileError, match=r"angles.yaml:2:8: .*is not an angle; allowed: numbers, pi"):
         load_yaml(path)
 
 
@@ -85,7 +85,7 @@ def test_a_yaml_file_that_is_not_valid_or_no_mapping_is_named_with_the_line(tmp_
     with pytest.raises(ParameterFileError, match=r"broken.yaml:3:\d+: is not valid YAML"):
         load_yaml(path)
     path.write_text("- a\n")
-    with pytest.raises(ParameterFileError, match="broken.yaml:1: holds a list; a mapping"):
+    with pytest.raises(ParameterFileError, match="broken.yaml:1: contains a list; it must be a mapping"):
         load_yaml(path)
 
 

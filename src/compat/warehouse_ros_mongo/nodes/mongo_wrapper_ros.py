@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stands in for the MongoDB server that `db:=true` of MoveIt's launch files starts: it says what to use instead."""
+"""Replaces the MongoDB server that `db:=true` of MoveIt's launch files starts; the error names the alternatives."""
 
 import sys
 

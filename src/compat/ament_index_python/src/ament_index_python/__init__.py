@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Look-up of packages as launch files of ROS 2 write it, over rospkg."""
+"""Package look-up of ROS 2 launch files, implemented by rospkg."""
 
 from __future__ import annotations
 

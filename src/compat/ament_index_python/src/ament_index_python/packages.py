@@ -23,7 +23,7 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
 
     Args:
         package_name: Name of the package.
-        print_warning: Accepted.
+        print_warning: Accepted and ignored.
 
     Raises:
         PackageNotFoundError: There is no such package.
@@ -38,12 +38,12 @@ def get_package_share_path(package_name: str, print_warning: bool = True) -> Pat
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Returns the folder that a package is installed in; in a workspace that is not installed, that of its files."""
+    """Returns the install prefix of a package; without an install space, the folder of the package."""
     share = get_package_share_path(package_name)
     return str(share.parent.parent if share.parent.name == "share" else share)
 
 
 def get_packages_with_prefixes() -> dict[str, str]:
-    """Returns the names of all packages, with their folders."""
+    """Returns the folders of all packages, by name."""
     finder = rospkg.RosPack()
     return {name: get_package_prefix(name) for name in finder.list()}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Python side of the controller manager under the name that user scripts import."""
+"""Python interface of the controller manager under its public name."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks the controller manager of the node's namespace, prints the answer and returns whether it did what was asked."""
+"""Functions that call the controller manager in the node's namespace, print the response and return the success."""
 
 from modular_framework_control.ros.controller_manager_interface import (
     list_controller_types,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of a launch file, collected from the files of a package; names as in ROS 2's launch_param_builder."""
+"""Builder of launch parameters from the files of a package, with the names of ROS 2's launch_param_builder."""
 
 from launch_param_builder.launch_param_builder import ParameterBuilder
 from launch_param_builder.utils import (

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads YAML as rosparam does, angles included, without executing what stands in a file.
+"""Reads YAML with rosparam's notation of angles, without executing text of the file.
 
-rosparam takes `!degrees 90`, `deg(90)`, `!radians pi/2` and `rad(pi/2)` for numbers, and hands their text to `eval`.
+rosparam evaluates `!degrees 90`, `deg(90)`, `!radians pi/2` and `rad(pi/2)` by `eval`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
 
 
 class AngleLoader(yaml.SafeLoader):
-    """YAML's safe loader that also knows rosparam's angles."""
+    """Safe YAML loader that also reads rosparam's angles."""
 
 
 def _value(node: ast.expr) -> float:
-    """Returns what an expression of numbers, pi and + - * / comes to; raises ValueError for anything else."""
+    """Returns the value of an expression of numbers, pi and + - * /; raises ValueError for all other expressions."""
     match node:
         case ast.Constant(value=int() | float() as number):
             return float(number)
@@ -50,7 +50,7 @@ def _angle(loader: AngleLoader, node: yaml.nodes.ScalarNode) -> float:
         value = _value(ast.parse(inner.strip(), mode="eval").body)
     except (SyntaxError, ValueError, ZeroDivisionError, RecursionError):
         raise yaml.constructor.ConstructorError(
-            None, None, f"'{text}' is no angle; allowed are numbers, pi and + - * /", node.start_mark
+            None, None, f"'{text}' is not an angle; allowed: numbers, pi, + - * /", node.start_mark
         ) from None
     return math.radians(value) if node.tag == "!degrees" else value
 
@@ -61,5 +61,5 @@ for _tag, _word in (("!degrees", "deg"), ("!radians", "rad")):
 
 
 def parse_yaml(text: str) -> Any:
-    """Returns what a YAML text holds; raises yaml.YAMLError."""
+    """Returns the content of a YAML text; raises yaml.YAMLError."""
     return yaml.load(text, Loader=AngleLoader)

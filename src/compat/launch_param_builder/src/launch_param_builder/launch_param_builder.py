@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collects parameters from the files of one package, step by step."""
+"""Builder that collects parameters from the files of a package."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from launch_param_builder.utils import ParameterValueType, load_file, load_xacro
 
 
 class ParameterBuilder:
-    """Collects parameters; every step returns the builder, `to_dict` what was collected.
+    """Collects parameters; all methods except `to_dict` return the builder, so that calls can be chained.
 
     File paths are absolute or relative to the package.
     """
@@ -23,13 +23,13 @@ class ParameterBuilder:
             package_name: ROS package whose files are loaded.
 
         Raises:
-            ParameterFileError: it is not on ROS_PACKAGE_PATH.
+            ParameterFileError: The package is not on ROS_PACKAGE_PATH.
         """
         self._package_path: Path = package_folder(package_name)
         self._parameters: dict[str, Any] = {}
 
     def yaml(self, file_path: Path | str, parameter_namespace: str | None = None) -> Self:
-        """Adds the parameters of a YAML file, below a namespace if one is given."""
+        """Adds the parameters of a YAML file, optionally below a namespace."""
         content = load_yaml(self._package_path / file_path)
         if parameter_namespace:
             self._parameters.setdefault(parameter_namespace, {}).update(content)

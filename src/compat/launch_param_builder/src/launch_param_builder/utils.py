@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads files into parameters: YAML, xacro and plain text. The module has the name it has in ROS 2."""
+"""Loads parameters from YAML, xacro and text files. The module name is the name in ROS 2."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from xacro_rospkg.expansion import find_package
 
 from launch_param_builder.angle_yaml import parse_yaml
 
-MOST_NAMES = 20  # of files that an error lists
+MAX_LISTED_FILES = 20  # in an error message
 ParameterValueType = str | int | float | bool | list[Any] | dict[str, Any]
 
 
 class ParameterBuilderFileNotFoundError(KeyError):
-    """A file that was to be loaded does not exist."""
+    """A file to load does not exist."""
 
     def __str__(self) -> str:
         return str(self.args[0]) if self.args else ""
 
 
 class ParameterFileError(RuntimeError):
-    """A file, or the package it is in, cannot be used; the message names it, and the line where there is one."""
+    """A file or package cannot be used; the message contains the name and, if known, the line."""
 
 
 def package_folder(package: str) -> Path:
     """Returns the folder of a ROS package.
 
     Raises:
-        ParameterFileError: it is not on ROS_PACKAGE_PATH; names packages with a similar name.
+        ParameterFileError: The package is not on ROS_PACKAGE_PATH; the message contains similar names.
     """
     try:
         return Path(find_package(package))
     except PackageNotFoundError as error:
-        hint = f"did you mean {' or '.join(error.similar)}?" if error.similar else "nothing there has a similar name."
+        hint = f"did you mean {' or '.join(error.similar)}?" if error.similar else "no package has a similar name."
         raise ParameterFileError(
             f"no ROS package '{package}' on ROS_PACKAGE_PATH; {hint} "
             "If the name is right, source the setup.bash of the workspace that has the package."
@@ -47,17 +47,19 @@ def package_folder(package: str) -> Path:
 
 
 def raise_if_file_not_found(file_path: Path | str) -> None:
-    """Raises ParameterBuilderFileNotFoundError for a file that does not exist; it names files beside it."""
+    """Raises ParameterBuilderFileNotFoundError for a missing file; the message lists files of the same folder."""
     path = Path(file_path)
     if path.is_file():
         return
     if path.is_dir():
-        raise ParameterBuilderFileNotFoundError(f"{path} is a folder; a file is needed")
+        raise ParameterBuilderFileNotFoundError(f"{path} is a folder; give a file")
     folder = next((parent for parent in path.parents if parent.is_dir()), Path("/"))
     names = sorted(each.name for each in folder.iterdir())
-    if folder != path.parent or len(names) > MOST_NAMES:
-        names = difflib.get_close_matches(path.name if folder == path.parent else path.parent.name, names, MOST_NAMES)
-    hint = f"{folder} has {', '.join(names)}" if names else f"{folder} has nothing of a similar name"
+    if folder != path.parent or len(names) > MAX_LISTED_FILES:
+        names = difflib.get_close_matches(
+            path.name if folder == path.parent else path.parent.name, names, MAX_LISTED_FILES
+        )
+    hint = f"{folder} has {', '.join(names)}" if names else f"{folder} has no file with a similar name"
     raise ParameterBuilderFileNotFoundError(f"File {path} doesn't exist; {hint}")
 
 
@@ -65,8 +67,8 @@ def load_file(file_path: Path | str) -> str:
     """Returns the text of a file.
 
     Raises:
-        ParameterBuilderFileNotFoundError: there is none.
-        ParameterFileError: it cannot be read as UTF-8.
+        ParameterBuilderFileNotFoundError: The file does not exist.
+        ParameterFileError: The file is not readable as UTF-8.
     """
     raise_if_file_not_found(file_path)
     try:
@@ -76,26 +78,26 @@ def load_file(file_path: Path | str) -> str:
 
 
 def load_yaml(file_path: Path | str) -> dict[str, Any]:
-    """Returns the parameters in a YAML file; none for an empty one.
+    """Returns the parameters of a YAML file; an empty file has no parameters.
 
     Raises:
-        ParameterBuilderFileNotFoundError: there is no such file.
-        ParameterFileError: it is not valid YAML, or no mapping.
+        ParameterBuilderFileNotFoundError: The file does not exist.
+        ParameterFileError: The file is not valid YAML or not a mapping.
     """
     return parse_parameters(load_file(file_path), file_path)
 
 
 def parse_parameters(text: str, file_path: Path | str) -> dict[str, Any]:
-    """Returns the parameters in the text of a YAML file; none for an empty one.
+    """Returns the parameters in the text of a YAML file; an empty text has no parameters.
 
-    Entries without a value are left out and names are texts, since ROS 1's parameter server takes nothing else.
+    Entries without a value are omitted and keys become strings, as the parameter server of ROS 1 requires.
 
     Args:
-        text: of the file.
-        file_path: the file, for messages.
+        text: Text of the file.
+        file_path: Path of the file, for messages.
 
     Raises:
-        ParameterFileError: it is not valid YAML, or no mapping.
+        ParameterFileError: The text is not valid YAML or not a mapping.
     """
     try:
         content = parse_yaml(text)
@@ -108,14 +110,14 @@ def parse_parameters(text: str, file_path: Path | str) -> dict[str, Any]:
         return {}
     if not isinstance(content, dict):
         raise ParameterFileError(
-            f"{file_path}:1: holds a {type(content).__name__}; a mapping of parameter names to values is needed"
+            f"{file_path}:1: contains a {type(content).__name__}; it must be a mapping of parameter names to values"
         )
     parameters: dict[str, Any] = _settable(content)
     return parameters
 
 
 def _settable(value: Any) -> Any:
-    """Returns a value of YAML as the parameter server can hold it."""
+    """Returns a YAML value converted to the types of the parameter server."""
     match value:
         case dict():
             return {str(key): _settable(item) for key, item in value.items() if item is not None}
@@ -127,15 +129,15 @@ def _settable(value: Any) -> Any:
 
 
 def load_xacro(file_path: Path | str, mappings: Mapping[str, Any] | None = None) -> str:
-    """Returns the XML that a xacro file expands to.
+    """Returns the XML of an expanded xacro file.
 
     Args:
-        file_path: xacro file, or plain XML.
-        mappings: values of its arguments.
+        file_path: Path of a xacro or XML file.
+        mappings: Values of the xacro arguments.
 
     Raises:
-        ParameterBuilderFileNotFoundError: there is no such file.
-        ParameterFileError: xacro refuses it, or a package it names is not found.
+        ParameterBuilderFileNotFoundError: The file does not exist.
+        ParameterFileError: The file is not valid xacro, or refers to a missing package.
     """
     raise_if_file_not_found(file_path)
     try:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The modules of MoveIt's Python bindings under their public names; moveit_commander does the work."""
+"""Modules of MoveIt's Python bindings under their public names, implemented by moveit_commander."""

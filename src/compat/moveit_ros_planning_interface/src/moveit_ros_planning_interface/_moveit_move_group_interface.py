@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A planning group with messages as bytes, as MoveIt's binding offers it.
+"""Interface of a planning group with serialized messages, as in MoveIt's Python binding.
 
-A method that the commander has with the same arguments is the commander's own (`SAME`). The others differ in form only:
-messages are bytes, poses are lists, and a refused target is a False with the reason on the log.
+Methods with the same signature as in the commander are forwarded (`SAME`). The other methods differ only in form:
+messages are serialized, poses are lists, and an invalid target returns False and logs the reason.
 """
 
 from __future__ import annotations
@@ -82,21 +82,21 @@ SAME = frozenset(
 
 
 class MoveGroupInterface:
-    """Plans and moves one planning group."""
+    """Plans and executes motions of a planning group."""
 
     def __init__(self, group_name: str, robot_description: str, ns: str = "", wait_for_servers: float = 5.0) -> None:
-        """Connects to move_group; raises RuntimeError if the group is unknown or move_group does not answer.
+        """Connects to move_group; raises RuntimeError if the group is unknown or move_group does not respond.
 
         Args:
-            group_name: the planning group.
-            robot_description: parameter with the robot's URDF; SRDF and limits are beside it.
-            ns: namespace of move_group's services and of joint_states.
-            wait_for_servers: how long to wait for move_group [s]; 0: for ever.
+            group_name: Name of the planning group.
+            robot_description: Parameter with the URDF; prefix of the parameters with SRDF and limits.
+            ns: Namespace of move_group's services and of joint_states.
+            wait_for_servers: Timeout for the connection to move_group [s]; 0 for no timeout.
         """
         self._commander = MoveGroupCommander(group_name, robot_description, ns, wait_for_servers)
 
     def __getattr__(self, name: str) -> Any:
-        """Finds the methods that are the commander's own."""
+        """Returns a forwarded method of the commander."""
         if name in SAME:
             return getattr(self._commander, name)
         raise AttributeError(f"MoveGroupInterface has no attribute '{name}'")
@@ -114,11 +114,11 @@ class MoveGroupInterface:
         return write(self._commander.get_interface_description())
 
     def set_end_effector_link(self, link_name: str) -> bool:
-        """Chooses the link that poses are meant for."""
+        """Sets the link to which pose targets apply."""
         return accepted(self._commander.set_end_effector_link, link_name)
 
     def start_state_monitor(self, wait: float = 1.0) -> bool:
-        """Returns whether every joint's state is received within `wait` [s]."""
+        """Returns whether the states of all joints are received within `wait` [s]."""
         return accepted(self._commander._state.positions, (), wait)
 
     def get_current_state(self) -> bytes:
@@ -126,12 +126,12 @@ class MoveGroupInterface:
         return write(self._commander.get_current_state())
 
     def get_current_state_bounded(self) -> dict[str, float]:
-        """Returns the present joint positions by name, each within its bounds [rad or m]."""
+        """Returns the current joint positions by name, clamped to the bounds [rad or m]."""
         state = self._commander.get_current_state_bounded().joint_state
         return dict(zip(state.name, state.position, strict=True))
 
     def enforce_bounds(self, state: bytes) -> bytes:
-        """Returns a moveit_msgs/RobotState with each joint within its bounds."""
+        """Returns a moveit_msgs/RobotState with joint positions clamped to the bounds."""
         return write(self._commander.enforce_bounds(read(RobotState, state)))
 
     def get_current_pose(self, end_effector_link: str = "") -> list[float]:
@@ -150,31 +150,31 @@ class MoveGroupInterface:
         return accepted(self._commander.set_joint_value_target, target, value)
 
     def set_joint_value_target_from_pose(self, pose: bytes, link: str, approximate: bool) -> bool:
-        """Sets the joint values that bring a link to a geometry_msgs/Pose.
+        """Sets a joint target from a pose by inverse kinematics.
 
         Args:
             pose: geometry_msgs/Pose in the pose reference frame.
-            link: Link to bring there; empty for the end effector link.
-            approximate: Whether the nearest pose that can be reached is accepted.
+            link: Link for the pose; empty for the end effector link.
+            approximate: Whether the nearest reachable pose is accepted.
         """
         return accepted(self._commander.set_joint_value_target, read(Pose, pose), link, approximate)
 
     def set_joint_value_target_from_pose_stamped(self, pose: bytes, link: str, approximate: bool) -> bool:
-        """Sets the joint values that bring a link to a geometry_msgs/PoseStamped.
+        """Sets a joint target from a stamped pose by inverse kinematics.
 
         Args:
             pose: geometry_msgs/PoseStamped.
-            link: Link to bring there; empty for the end effector link.
-            approximate: Whether the nearest pose that can be reached is accepted.
+            link: Link for the pose; empty for the end effector link.
+            approximate: Whether the nearest reachable pose is accepted.
         """
         return accepted(self._commander.set_joint_value_target, read(PoseStamped, pose), link, approximate)
 
     def set_joint_value_target_from_joint_state_message(self, state: bytes) -> bool:
-        """Sets the joint target of a sensor_msgs/JointState."""
+        """Sets a joint target from a sensor_msgs/JointState."""
         return accepted(self._commander.set_joint_value_target, read(JointState, state))
 
     def set_named_target(self, name: str) -> bool:
-        """Sets a joint target by its name."""
+        """Sets a named joint target."""
         return accepted(self._commander.set_named_target, name)
 
     def set_pose_target(self, pose: Sequence[float], end_effector_link: str = "") -> bool:
@@ -182,7 +182,7 @@ class MoveGroupInterface:
         return accepted(self._commander.set_pose_target, pose, end_effector_link)
 
     def set_pose_targets(self, poses: Sequence[Sequence[float]], end_effector_link: str = "") -> bool:
-        """Sets pose targets, any of which may be reached."""
+        """Sets alternative pose targets."""
         return accepted(self._commander.set_pose_targets, poses, end_effector_link)
 
     def set_position_target(self, x: float, y: float, z: float, end_effector_link: str = "") -> bool:
@@ -221,19 +221,19 @@ class MoveGroupInterface:
 
     # ---------------------------------------------------------------- settings
     def set_start_state(self, state: bytes) -> None:
-        """Lets plans start at a moveit_msgs/RobotState."""
+        """Sets the start state of plans to a moveit_msgs/RobotState."""
         self._commander.set_start_state(read(RobotState, state))
 
     def set_workspace(self, *corners: float) -> None:
-        """Bounds the workspace: min x, y, z, max x, y, z [m]."""
+        """Sets the bounds of the workspace: min x, y, z, max x, y, z [m]."""
         self._commander.set_workspace(corners)
 
     def set_path_constraints(self, name: str) -> bool:
-        """Sets path constraints by their name in the database."""
+        """Sets path constraints by name, from the database."""
         return accepted(self._commander.set_path_constraints, name)
 
     def set_path_constraints_from_msg(self, constraints: bytes) -> None:
-        """Sets path constraints by a moveit_msgs/Constraints."""
+        """Sets path constraints from a moveit_msgs/Constraints."""
         self._commander.set_path_constraints(read(Constraints, constraints))
 
     def get_path_constraints(self) -> bytes:
@@ -241,7 +241,7 @@ class MoveGroupInterface:
         return write(self._commander.get_path_constraints())
 
     def set_trajectory_constraints_from_msg(self, constraints: bytes) -> None:
-        """Sets trajectory constraints by a moveit_msgs/TrajectoryConstraints."""
+        """Sets trajectory constraints from a moveit_msgs/TrajectoryConstraints."""
         self._commander.set_trajectory_constraints(read(TrajectoryConstraints, constraints))
 
     def get_trajectory_constraints(self) -> bytes:
@@ -259,19 +259,19 @@ class MoveGroupInterface:
         return write(code), write(trajectory), planning_time_s
 
     def move(self) -> bool:
-        """Plans, moves and returns whether the group is there."""
+        """Plans and executes; returns whether the group has reached the target."""
         return self._commander.go(wait=True)
 
     def async_move(self) -> bool:
-        """Sends the goal to plan and move."""
+        """Sends a goal to plan and execute, without waiting for the result."""
         return self._commander.go(wait=False)
 
     def execute(self, trajectory: bytes) -> bool:
-        """Moves along a moveit_msgs/RobotTrajectory and returns whether the group is there."""
+        """Executes a moveit_msgs/RobotTrajectory; returns whether the execution succeeded."""
         return self._commander.execute(read(RobotTrajectory, trajectory), wait=True)
 
     def async_execute(self, trajectory: bytes) -> bool:
-        """Sends the goal to move along a moveit_msgs/RobotTrajectory."""
+        """Sends a goal to execute a moveit_msgs/RobotTrajectory, without waiting for the result."""
         return self._commander.execute(read(RobotTrajectory, trajectory), wait=False)
 
     def compute_cartesian_path(
@@ -285,15 +285,15 @@ class MoveGroupInterface:
 
         Args:
             waypoints: Poses of the end effector as [x, y, z, qx, qy, qz, qw] or [x, y, z, roll, pitch, yaw] [m, rad].
-            eef_step: Largest distance between two points of the path [m].
-            avoid_collisions: Whether the path must be free of collisions.
+            eef_step: Maximum distance between two points of the path [m].
+            avoid_collisions: Whether the path must be collision-free.
             path_constraints: moveit_msgs/Constraints that each point must satisfy.
         """
         constraints = None if path_constraints is None else read(Constraints, path_constraints)
-        path, share = self._commander.compute_cartesian_path(
+        path, fraction = self._commander.compute_cartesian_path(
             waypoints, eef_step, avoid_collisions=avoid_collisions, path_constraints=constraints
         )
-        return write(path), share
+        return write(path), fraction
 
     def retime_trajectory(
         self,
@@ -308,9 +308,9 @@ class MoveGroupInterface:
         Args:
             state: moveit_msgs/RobotState in which the trajectory starts.
             trajectory: moveit_msgs/RobotTrajectory to retime.
-            velocity_scaling_factor: Share of the velocity limits, in (0, 1].
-            acceleration_scaling_factor: Share of the acceleration limits, in (0, 1].
-            algorithm: Name of the time parameterisation.
+            velocity_scaling_factor: Fraction of the velocity limits, in (0, 1].
+            acceleration_scaling_factor: Fraction of the acceleration limits, in (0, 1].
+            algorithm: Name of the time parameterization.
         """
         return write(
             self._commander.retime_trajectory(
@@ -324,12 +324,12 @@ class MoveGroupInterface:
 
     # ---------------------------------------------------------------- objects
     def pick(self, object_name: str, grasps: bytes | Sequence[bytes] | bool = (), plan_only: bool = False) -> int:
-        """Picks an object by one of some moveit_msgs/Grasp; returns the error code.
+        """Picks an object with one of the given moveit_msgs/Grasp; returns the error code.
 
         Args:
-            object_name: the object's id.
-            grasps: one grasp or several; a bool stands for `plan_only`, and grasps are planned then.
-            plan_only: whether nothing moves.
+            object_name: Id of the object.
+            grasps: A grasp or several grasps. A bool is the value of `plan_only`, with an empty list of grasps.
+            plan_only: Whether to plan without moving.
         """
         if isinstance(grasps, bool):
             return self._commander.pick(object_name, [], grasps)
@@ -342,10 +342,10 @@ class MoveGroupInterface:
         """Places an object.
 
         Args:
-            object_name: the object's id.
-            location: a moveit_msgs/PlaceLocation, or a pose as a list in the pose reference frame [m]; a bool stands
-                for `plan_only`, and the object is placed anywhere then.
-            plan_only: whether nothing moves.
+            object_name: Id of the object.
+            location: A moveit_msgs/PlaceLocation, or a pose as a list in the pose reference frame [m]. A bool is the
+                value of `plan_only`, without a location.
+            plan_only: Whether to plan without moving.
         """
         if isinstance(location, bool):
             return self._commander.place(object_name, None, location)

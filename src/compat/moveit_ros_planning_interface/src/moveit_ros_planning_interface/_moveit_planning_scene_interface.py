@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning scene with messages as bytes, as MoveIt's binding offers it."""
+"""Planning scene interface with serialized messages, as in MoveIt's Python binding."""
 
 from __future__ import annotations
 
@@ -16,11 +16,15 @@ class PlanningSceneInterface:
     """Reads and changes move_group's scene."""
 
     def __init__(self, ns: str = "") -> None:
-        """Args: ns: namespace of move_group's services."""
+        """Connects to the services of move_group.
+
+        Args:
+            ns: Namespace of move_group's services.
+        """
         self._scene = planning_scene_interface.PlanningSceneInterface(ns, synchronous=True)
 
     def get_known_object_names(self, with_type: bool = False) -> list[str]:
-        """Returns the names of the world's objects; with_type: only those with a type."""
+        """Returns the names of the world objects; if `with_type`, only of objects with a type."""
         return self._scene.get_known_object_names(with_type)
 
     def get_known_object_names_in_roi(
@@ -35,7 +39,7 @@ class PlanningSceneInterface:
             maxx: Upper bound along x [m].
             maxy: Upper bound along y [m].
             maxz: Upper bound along z [m].
-            with_type: Whether only objects with a type count.
+            with_type: Whether to return only objects with a type.
         """
         return self._scene.get_known_object_names_in_roi(minx, miny, minz, maxx, maxy, maxz, with_type)
 
@@ -44,23 +48,23 @@ class PlanningSceneInterface:
         return _serialized(self._scene.get_object_poses(object_ids))
 
     def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, bytes]:
-        """Returns moveit_msgs/CollisionObject by name; none named: all of them."""
+        """Returns moveit_msgs/CollisionObject by name; all world objects if no name is given."""
         return _serialized(self._scene.get_objects(object_ids))
 
     def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, bytes]:
-        """Returns moveit_msgs/AttachedCollisionObject by name; none named: all of them."""
+        """Returns moveit_msgs/AttachedCollisionObject by name; all attached objects if no name is given."""
         return _serialized(self._scene.get_attached_objects(object_ids))
 
     def get_planning_scene(self, components: int) -> bytes:
-        """Returns parts of the scene (moveit_msgs/PlanningScene): bits of moveit_msgs/PlanningSceneComponents."""
+        """Returns a moveit_msgs/PlanningScene with the components given as bits of PlanningSceneComponents."""
         return write(self._scene.get_planning_scene(components))
 
     def apply_planning_scene(self, planning_scene: bytes) -> bool:
-        """Changes the scene by a moveit_msgs/PlanningScene; returns whether move_group applied it."""
+        """Applies a moveit_msgs/PlanningScene to the scene; returns whether move_group applied it."""
         return self._scene.apply_planning_scene(read(PlanningScene, planning_scene))
 
     def clear(self) -> bool:
-        """Takes every object out of the scene, attached ones too; raises if move_group refuses it."""
+        """Removes all world objects and attached objects from the scene; raises if move_group refuses the change."""
         self._scene.clear()
         return True
 

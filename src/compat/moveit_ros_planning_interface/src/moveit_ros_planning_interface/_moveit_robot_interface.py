@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's description and present state, with messages as bytes, as MoveIt's binding offers it."""
+"""Robot description and current state with serialized messages, as in MoveIt's Python binding."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from moveit_ros_planning_interface.serialized import read, write
 
 
 class RobotInterface:
-    """Answers questions about a robot; a name that the robot does not have gives an empty answer."""
+    """Robot model and current state; methods return an empty result for an unknown name."""
 
     def __init__(self, robot_description: str, ns: str = "") -> None:
-        """Reads the robot's description; raises RuntimeError if it is missing or cannot be read.
+        """Reads the robot description; raises RuntimeError if it is missing or invalid.
 
         Args:
-            robot_description: parameter with the URDF; SRDF and limits are beside it.
-            ns: namespace of move_group's services and of joint_states.
+            robot_description: Parameter with the URDF; prefix of the parameters with SRDF and limits.
+            ns: Namespace of move_group's services and of joint_states.
         """
         self._robot = RobotCommander(robot_description, ns)
         self._model = current_state(robot_description, ns).model
 
     def get_robot_name(self) -> str:
-        """Returns the name in the robot's description."""
+        """Returns the name in the robot description."""
         return self._robot.get_robot_name()
 
     def get_robot_root_link(self) -> str:
-        """Returns the link that has no parent."""
+        """Returns the root link."""
         return self._robot.get_root_link()
 
     def get_planning_frame(self) -> str:
-        """Returns the frame in which planning is done."""
+        """Returns the planning frame."""
         return self._robot.get_planning_frame()
 
     def get_joint_names(self) -> list[str]:
-        """Returns all joints, fixed and mimic ones included."""
+        """Returns all joints, including fixed joints and mimic joints."""
         return self._robot.get_joint_names()
 
     def get_active_joint_names(self) -> list[str]:
-        """Returns the joints that move by themselves."""
+        """Returns the active joints."""
         return self._robot.get_active_joint_names()
 
     def get_link_names(self) -> list[str]:
@@ -51,7 +51,7 @@ class RobotInterface:
         return self._robot.get_link_names()
 
     def has_group(self, group: str) -> bool:
-        """Returns whether there is a planning group of that name."""
+        """Returns whether the planning group exists."""
         return self._robot.has_group(group)
 
     def get_group_names(self) -> list[str]:
@@ -63,7 +63,7 @@ class RobotInterface:
         return self._robot.get_joint_names(group) if self.has_group(group) else []
 
     def get_group_active_joint_names(self, group: str) -> list[str]:
-        """Returns the joints of a group that move by themselves."""
+        """Returns the active joints of a group."""
         return self._robot.get_active_joint_names(group) if self.has_group(group) else []
 
     def get_group_link_names(self, group: str) -> list[str]:
@@ -71,16 +71,16 @@ class RobotInterface:
         return self._robot.get_link_names(group) if self.has_group(group) else []
 
     def get_group_joint_tips(self, group: str) -> list[str]:
-        """Returns the links of a group that end effectors are mounted on."""
+        """Returns the parent links of the end effectors that are attached to a group."""
         return [item.parent_link for item in self._model.end_effectors if item.parent_group == group]
 
     def get_parent_group(self, group: str) -> tuple[str, str]:
-        """Returns the group and the link an end effector's group is mounted on; empty texts if it is not mounted."""
+        """Returns the parent group and parent link of an end effector's group; empty strings if not attached."""
         found = [item for item in self._model.end_effectors if item.group == group]
         return (found[0].parent_group, found[0].parent_link) if found else ("", "")
 
     def get_group_default_states(self, group: str) -> list[str]:
-        """Returns the names of a group's states in the SRDF."""
+        """Returns the names of the group's states in the SRDF."""
         return sorted(self._model.groups[group].states) if self.has_group(group) else []
 
     def get_joint_values(self, group: str, named_state: str) -> dict[str, float]:
@@ -98,15 +98,15 @@ class RobotInterface:
         return pose_to_list(self._robot.get_link(name).pose().pose) if name in self._model.links else []
 
     def get_current_state(self) -> bytes:
-        """Returns the present state (moveit_msgs/RobotState)."""
+        """Returns the current state (moveit_msgs/RobotState)."""
         return write(self._robot.get_current_state())
 
     def get_current_variable_values(self) -> dict[str, float]:
-        """Returns the present joint positions by name [rad or m]."""
+        """Returns the current joint positions by name [rad or m]."""
         return self._robot.get_current_variable_values()
 
     def get_current_joint_values(self, name: str) -> list[float]:
-        """Returns the present values of a joint's variables [rad or m]."""
+        """Returns the current values of a joint's variables [rad or m]."""
         value = self._robot.get_joint(name).value() if name in self._model.joints else []
         return value if isinstance(value, list) else [value]
 
@@ -114,8 +114,8 @@ class RobotInterface:
         """Returns visualization_msgs/MarkerArray of the robot.
 
         Args:
-            args: nothing; a serialized moveit_msgs/RobotState; a list of links; a dict of joint positions [rad or m],
-                and perhaps a list of links.
+            args: Either no argument, a serialized moveit_msgs/RobotState, a list of links, or a dict of joint positions
+                [rad or m], optionally followed by a list of links.
         """
         match args:
             case (bytes() as state,):
@@ -125,5 +125,5 @@ class RobotInterface:
         return write(self._robot.get_robot_markers(*args))
 
     def get_group_markers(self, group: str, *values: dict[str, float]) -> bytes:
-        """Returns visualization_msgs/MarkerArray of a group, perhaps at given joint positions [rad or m]."""
+        """Returns visualization_msgs/MarkerArray of a group, optionally at given joint positions [rad or m]."""
         return write(self._robot.get_robot_markers(group, *values))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the process a ROS node, under the names of MoveIt's binding of roscpp."""
+"""Initializes the ROS node, under the names of MoveIt's roscpp binding."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from moveit_commander import roscpp_initializer
 
 
 def roscpp_init(node_name: str, argv: Sequence[str]) -> None:
-    """Keeps the name and the command line for the node, which the first interface makes unless the script has one."""
+    """Stores node name and command line; the first interface initializes the node, unless the script has done so."""
     roscpp_initializer.roscpp_initialize(argv, node_name)
 
 
 def roscpp_shutdown() -> None:
-    """Closes the connections of the interfaces; ends the node only if they have made it."""
+    """Closes the connections of the interfaces; shuts the node down only if an interface has initialized it."""
     roscpp_initializer.roscpp_shutdown()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arm commander of this framework under the public name of the one it stands in for."""
+"""Arm commander of this framework under the public name of sr_robot_commander's class."""
 
 from modular_framework_core.commander.arm_commander import ArmCommander as SrArmCommander
 

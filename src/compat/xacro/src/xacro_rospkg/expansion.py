@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Expansion of xacro files whose ``$(find pkg)`` must be answered by rospkg."""
+"""Expands xacro files and resolves ``$(find pkg)`` by rospkg."""
 
 import difflib
 import sys
@@ -21,14 +21,14 @@ class PackageNotFoundError(substitution_args.SubstitutionException):
     """``$(find pkg)`` names a package that is not on ROS_PACKAGE_PATH.
 
     Attributes:
-        package: the name that was looked for.
-        similar: names of packages that exist and look like it.
+        package: Name of the missing package.
+        similar: Similar names of existing packages.
     """
 
     def __init__(self, package: str, similar: Sequence[str]) -> None:
         self.package = package
         self.similar = tuple(similar)
-        hint = f"did you mean {' or '.join(self.similar)}?" if similar else "nothing there has a similar name."
+        hint = f"did you mean {' or '.join(self.similar)}?" if similar else "no package has a similar name."
         super().__init__(
             f"$(find {package}): no ROS package '{package}' on ROS_PACKAGE_PATH; {hint} "
             "If the name is right, source the setup.bash of the workspace that has the package."
@@ -39,10 +39,10 @@ def find_package(package: str) -> str:
     """Returns the folder of a ROS package.
 
     Args:
-        package: name as written in its package.xml.
+        package: Package name, as in package.xml.
 
     Raises:
-        PackageNotFoundError: when the package is not on ROS_PACKAGE_PATH.
+        PackageNotFoundError: The package is not on ROS_PACKAGE_PATH.
     """
     packages = rospkg.RosPack()
     try:
@@ -52,10 +52,10 @@ def find_package(package: str) -> str:
 
 
 def parse_without_doctype(inp: Any, filename: str | None = None) -> Any:
-    """Parses a text or file as ``xacro.parse`` does; a DOCTYPE is refused before any entity is expanded.
+    """Parses a text or file as ``xacro.parse`` does, and refuses a DOCTYPE before entities are expanded.
 
     Raises:
-        xacro.XacroException: when there is a DOCTYPE.
+        xacro.XacroException: The document has a DOCTYPE.
     """
     source = Path(xacro.root_dir, filename or "text")
     text = inp if isinstance(inp, str) else source.read_bytes() if inp is None and source.is_file() else ""
@@ -67,7 +67,7 @@ def parse_without_doctype(inp: Any, filename: str | None = None) -> Any:
 
 
 def adapt_xacro() -> None:
-    """Makes the xacro module resolve ``$(find pkg)`` through rospkg, and refuse a DOCTYPE in every file it reads."""
+    """Changes the xacro module so that it resolves ``$(find pkg)`` by rospkg and refuses a DOCTYPE."""
     if not hasattr(substitution_args, "_eval_find"):
         raise RuntimeError(
             "xacro.substitution_args has no '_eval_find': this version of the PyPI package xacro is not supported. "
@@ -78,15 +78,15 @@ def adapt_xacro() -> None:
 
 
 def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
-    """Returns the XML a xacro file expands to.
+    """Returns the XML of an expanded xacro file.
 
     Args:
-        path: the xacro file.
-        mappings: values of its ``xacro:arg``s, as on the command line ``name:=value``.
+        path: Path of the xacro file.
+        mappings: Values of the ``xacro:arg`` elements, as in ``name:=value`` on the command line.
 
     Raises:
-        PackageNotFoundError: when a ``$(find pkg)`` cannot be answered.
-        xacro.XacroException: when the file is not valid xacro.
+        PackageNotFoundError: A package of ``$(find pkg)`` is missing.
+        xacro.XacroException: The file is not valid xacro.
     """
     adapt_xacro()
     try:
@@ -99,7 +99,7 @@ def expand(path: str | Path, mappings: Mapping[str, str] | None = None) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs the ``xacro`` command line; ``--inorder`` is accepted and, being the only order there is, ignored."""
+    """Runs the ``xacro`` command; ``--inorder`` is accepted and ignored, because there is no other order."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     adapt_xacro()
     sys.argv = [sys.argv[0], *(argument for argument in given if argument not in _IN_ORDER_FLAGS)]

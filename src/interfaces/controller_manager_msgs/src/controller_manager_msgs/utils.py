@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds controller managers, and among their controllers those with a name, type, state, interface or resources.
+"""Lists controller managers, and filters their controllers by name, type, state, interface or resources.
 
-The functions and classes are those of the public module of this name, which graphical tools and user scripts import.
+The functions and classes have the names of the public module, which graphical tools and user scripts import.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ MANAGER_SERVICES = {
     "switch_controller": "controller_manager_msgs/SwitchController",
     "reload_controller_libraries": "controller_manager_msgs/ReloadControllerLibraries",
 }
-"""Type of each service that a controller manager has, by the service's name in the manager's namespace."""
+"""Types of the services of a controller manager, by name in the manager's namespace."""
 
 
 def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] | None = None) -> list[str]:
-    """Namespaces of the controller managers that run, sorted.
+    """Returns the sorted namespaces of the running controller managers.
 
     Args:
-        namespace: where to look for them.
-        initial_guess: result of an earlier call; of the namespaces in it only the presence of one service is checked,
-            which spares the master most questions.
+        namespace: Namespace to search.
+        initial_guess: Result of an earlier call. For these namespaces, only one service is checked, which saves calls
+            to the master.
     """
     known = set(initial_guess or ())
     return sorted(
@@ -46,7 +46,7 @@ def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] |
 
 
 def is_controller_manager(namespace: str) -> bool:
-    """Whether `namespace` has all services of a controller manager, each of the right type."""
+    """Returns whether `namespace` contains all services of a controller manager with the right types."""
     return all(
         rosservice.get_service_type(f"{namespace.rstrip('/')}/{name}") == service_type
         for name, service_type in MANAGER_SERVICES.items()
@@ -66,12 +66,12 @@ def _namespaces_that_list_controllers(namespace: str) -> set[str]:
 
 
 class ControllerManagerLister:
-    """Called without arguments, it gives the namespaces of the controller managers that run below one namespace.
+    """Callable that returns the namespaces of the running controller managers.
 
-    It remembers its last answer, so that repeated calls are cheap.
+    The last result is cached, so that repeated calls are cheap.
 
     Args:
-        namespace: where to look for them.
+        namespace: Namespace to search.
     """
 
     def __init__(self, namespace: str = "/") -> None:
@@ -84,10 +84,10 @@ class ControllerManagerLister:
 
 
 class ControllerLister:
-    """Called without arguments, it gives the loaded controllers of one manager; none when the manager does not answer.
+    """Callable that returns the loaded controllers of a manager; an empty list if the manager does not respond.
 
     Args:
-        namespace: namespace of the controller manager.
+        namespace: Namespace of the controller manager.
     """
 
     def __init__(self, namespace: str = "/controller_manager") -> None:
@@ -95,7 +95,7 @@ class ControllerLister:
         self._service: Any = None
 
     def __call__(self) -> list[ControllerState]:
-        for _ in range(2):  # the kept connection ends with the manager, and a new manager may be there
+        for _ in range(2):  # the second attempt reconnects, because the manager may have restarted
             try:
                 if self._service is None:
                     self._service = rospy.ServiceProxy(self._service_name, ListControllers, persistent=True)
@@ -106,7 +106,7 @@ class ControllerLister:
         return []
 
     def close(self) -> None:
-        """Close the connection; the next call opens another one."""
+        """Closes the connection; the next call opens a new connection."""
         service, self._service = self._service, None
         if service is not None:
             service.close()
@@ -170,13 +170,13 @@ def filter_by_resources(
     hardware_interface: str | None = None,
     match_any: bool = False,
 ) -> list[ControllerState]:
-    """The controllers that claim these resources through one hardware interface.
+    """Returns the controllers that claim resources of a hardware interface.
 
     Args:
-        ctrl_list: the controllers.
-        resources: names of joints or other resources.
-        hardware_interface: the interface; any one when None.
-        match_any: whether one of the resources is enough; otherwise all of them must be claimed.
+        ctrl_list: Controllers to choose from.
+        resources: Names of joints or other resources.
+        hardware_interface: Name of the hardware interface; None for any interface.
+        match_any: Whether one claimed resource suffices; otherwise all resources must be claimed.
     """
     wanted = set(resources)
 
