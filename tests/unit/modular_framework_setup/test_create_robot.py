@@ -178,7 +178,7 @@ def test_an_effort_that_would_crush_every_object_is_replaced_with_a_note(
     ]
     (slide,) = (item for item in limits if item is not None and item.get("upper") == "0.04")
     assert float(slide.get("effort", "nan")) == pytest.approx(written)
-    assert ("has the effort 1000, with which a finger presses with 1000 N" in capsys.readouterr().out) == (
+    assert ("has the effort 1000, which corresponds to a finger force of 1000 N" in capsys.readouterr().out) == (
         effort == "1000"
     )
 

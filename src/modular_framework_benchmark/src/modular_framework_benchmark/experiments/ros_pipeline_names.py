@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks up the parameters of planning pipelines that an experiment gives, and the planners that they name."""
+"""Checks the pipeline parameters of an experiment, and the planner names in these parameters."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PipelineNames:
     registry: PlannerRegistry
 
     def faults(self, name: str, value: Any) -> Iterator[LaunchFault]:
-        """Yields what is wrong with a parameter; nothing if it is not below planning_pipelines."""
+        """Yields the faults of a parameter; none if the parameter is not below planning_pipelines."""
         if not name.startswith(self.parent):
             return
         declared = existing_declaration(PACKAGE, "planning_pipeline").parameters
@@ -81,13 +81,13 @@ class PipelineNames:
 
 
 def unknown_name(name: str, what: str, found: str, known: Collection[str]) -> LaunchFault:
-    """Returns the fault of a parameter whose value names nothing.
+    """Returns the fault of an unknown name.
 
     Args:
-        name: Parameter; empty if it is none.
-        what: Kind of thing that it names.
-        found: Its value.
-        known: Names that there are.
+        name: Parameter with the unknown name; "" if the name is not the value of a parameter.
+        what: Kind of name, such as `pipeline`.
+        found: Unknown name.
+        known: Existing names.
     """
     text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
     return LaunchFault(name, f"parameter '{name}': {text}" if name else text)

@@ -12,8 +12,8 @@ from modular_framework_urdf.xml_text import Element, add_child
 
 EFFORT, VELOCITY = 100.0, 1.0  # [N m or N], [rad/s or m/s]
 MAX_GRIP_N, GUESSED_GRIP_N = 250.0, 100.0
-"""Force of a finger beyond which an effort limit stands for "none" (the strongest electric grippers for arms press with
-about 250 N), and the force that is written then."""
+"""Maximum plausible force of a finger (about 250 N for the strongest electric grippers), and the force that replaces a
+larger force."""
 INTERFACE = "hardware_interface/PositionJointInterface"
 GAZEBO_PLUGIN = "libgazebo_ros_control.so"
 FRAME_MASS, FRAME_INERTIA = "1e-5", "1e-9"  # [kg], [kg m^2]; simulators may assume 1 kg for links without inertia
@@ -56,15 +56,15 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
 
 
 def bound_grip(root: Element, gripper: Gripper, travel: float) -> list[str]:
-    """Lowers the effort of a gripper's driver where it stands for none: such a force would crush what it holds.
+    """Lowers an implausibly large effort limit of a gripper's driver joint, which would crush grasped objects.
 
     Args:
-        root: of the URDF; changed.
-        gripper: of the robot.
-        travel: distance of a finger tip per unit of the driver [m/rad or m/m]; 0 where it is unknown.
+        root: Root element of the URDF, which is modified.
+        gripper: Gripper with the driver joint.
+        travel: Motion of a fingertip per unit of the driver joint [m/rad or m/m]; 0 if unknown.
 
     Returns:
-        A sentence for a user to correct it, if it was changed.
+        A sentence for the user if the effort limit was changed; otherwise an empty list.
     """
     limit = _joint(root, gripper.driver).find("limit")
     effort = float(limit.get("effort"))
@@ -72,7 +72,7 @@ def bound_grip(root: Element, gripper: Gripper, travel: float) -> list[str]:
         return []
     limit.set("effort", f"{GUESSED_GRIP_N * travel:.3g}")
     return [
-        f"joint '{gripper.driver}' has the effort {effort:g}, with which a finger presses with "
+        f"joint '{gripper.driver}' has the effort {effort:g}, which corresponds to a finger force of "
         f"{effort / travel:.0f} N; {limit.get('effort')} ({GUESSED_GRIP_N:g} N) is written instead: correct it"
     ]
 
