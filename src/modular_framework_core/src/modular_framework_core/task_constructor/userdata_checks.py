@@ -28,7 +28,7 @@ def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> N
     if node is None:
         return
     what = f"state '{child.label}': remapping"
-    names = header_fields.name_map(node, what, faults, example="{key_here: key_around}")
+    names = header_fields.name_map(node, what, faults, example="{key_of_the_state: key_of_the_machine}")
     known = _interface_keys(child)
     if names is None or known is None or not isinstance(node, Mapping):
         return
