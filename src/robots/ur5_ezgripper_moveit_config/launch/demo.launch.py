@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The UR5 with EZGripper on mock hardware, simulated or real, with move_group and RViz; as MoveIt 2's tutorial."""
+"""UR5 with EZGripper (mock, simulated or real hardware), move_group and RViz, in the form of MoveIt 2's tutorial."""
 
 import os
 
@@ -14,8 +14,8 @@ from moveit_configs_utils import MoveItConfigsBuilder
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Returns the description; `launch_py --show-args` lists its arguments."""
-    # What the robot's xacro file is given.
+    """Returns the launch description; `launch_py --show-args` lists the arguments."""
+    # Arguments of the robot's xacro file.
     launch_arguments = {
         "robot_ip": LaunchConfiguration("robot_ip"),
         "gripper_port": LaunchConfiguration("gripper_port"),
@@ -28,19 +28,19 @@ def generate_launch_description() -> LaunchDescription:
             "use_fake_hardware",
             default_value="true",
             choices=["true", "false"],
-            description="mock hardware that follows its commands exactly; false: the robot",
+            description="Mock hardware that follows its commands exactly; false for the real robot",
         ),
         DeclareLaunchArgument(
             "sim_gazebo",
             default_value="false",
             choices=["true", "false"],
-            description="the simulated robot, whatever use_fake_hardware says",
+            description="Use the simulated robot, regardless of use_fake_hardware",
         ),
-        DeclareLaunchArgument("robot_ip", default_value="192.168.56.101", description="address of the arm"),
-        DeclareLaunchArgument("gripper_port", default_value="/dev/ttyUSB0", description="serial device of the gripper"),
+        DeclareLaunchArgument("robot_ip", default_value="192.168.56.101", description="Address of the arm"),
+        DeclareLaunchArgument("gripper_port", default_value="/dev/ttyUSB0", description="Serial device of the gripper"),
     ]
 
-    # Everything move_group needs of the robot.
+    # Robot description and parameters of move_group.
     moveit_config = (
         MoveItConfigsBuilder("ur5_with_ezgripper", package_name="ur5_ezgripper_moveit_config")
         .robot_description(mappings=launch_arguments)
@@ -65,7 +65,7 @@ def generate_launch_description() -> LaunchDescription:
         description="RViz configuration file",
     )
     use_rviz_arg = DeclareLaunchArgument(
-        "use_rviz", default_value="true", choices=["true", "false"], description="whether to start RViz"
+        "use_rviz", default_value="true", choices=["true", "false"], description="Whether to start RViz"
     )
     rviz_base = LaunchConfiguration("rviz_config")
     rviz_config = PathJoinSubstitution([FindPackageShare("ur5_ezgripper_moveit_config"), "launch", rviz_base])
@@ -86,7 +86,7 @@ def generate_launch_description() -> LaunchDescription:
         condition=IfCondition(LaunchConfiguration("use_rviz")),
     )
 
-    # Where the robot stands: its root link is world, so map is the frame around it.
+    # Pose of the robot in map; the root link of the robot is world.
     static_tf = Node(
         package="tf2_ros",
         executable="static_transform_publisher",
@@ -105,7 +105,7 @@ def generate_launch_description() -> LaunchDescription:
         parameters=[moveit_config.robot_description],
     )
 
-    # Hardware, as sim_gazebo and use_fake_hardware say, and its controllers.
+    # Hardware, selected by sim_gazebo and use_fake_hardware, and its controllers.
     ros2_controllers_path = os.path.join(
         get_package_share_directory("ur5_ezgripper_moveit_config"),
         "config",
