@@ -17,7 +17,7 @@ MODES: Mapping[str, Mode] = {mode.name: mode for mode in (TASK, PLANNING, KINEMA
 
 
 def stored_settings(mode: str, content: Mapping[str, Any]) -> EpisodeSettings:
-    """Returns the settings of a stored episode; those that all modes have for a mode of another version.
+    """Returns the settings of a stored episode; for an unknown mode, only the settings that all modes have.
 
     Args:
         mode: Name of the mode.

@@ -70,5 +70,5 @@ def _unknown(part: str, patterns: list[_Pattern], robot: Mapping[str, Collection
         kind = first.strip("{}") if first.startswith("{") else ""
         kinds += [kind] if kind else []
         names += robot[kind] if kind else [first]
-    what = " or ".join(kinds) if kinds else "parameter"
-    return f"names no {what}: '{part}'; {listing(names, 'there is none')}{nearest(part, names)}"
+    kind_text = " or ".join(kinds) if kinds else "parameter"
+    return f"names no {kind_text}: '{part}'; {listing(names, 'there is none')}{nearest(part, names)}"
