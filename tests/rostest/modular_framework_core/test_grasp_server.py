@@ -181,7 +181,7 @@ def test_fingers_that_close_on_nothing_have_grasped_nothing(gripper: FakeGripper
     gripper.position, gripper.obstacle = 0.4, float("inf")
     state, flags, text, _ = send(client, GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
-    assert "without anything between" in text
+    assert "without an object between" in text
 
 
 def test_a_pregrasp_that_is_blocked_is_a_failure(gripper: FakeGripper, client) -> None:
@@ -195,11 +195,11 @@ def test_a_pregrasp_that_is_blocked_is_a_failure(gripper: FakeGripper, client) -
     ("message", "stage", "torque", "hint"),
     [
         (grasp, 7, 400.0, "POST_GRASP_STATE"),
-        (lambda: grasp(3.0), 1, 400.0, "limits"),
+        (lambda: grasp(3.0), 1, 400.0, "the target is 3.0; allowed"),
         (StandardisedGrasp, 1, 400.0, "at least"),
         (grasp, 1, 0.0, "max_torque"),
         (grasp, 1, float("nan"), "max_torque is nan"),
-        (lambda: grasp(torques=(0.0,)), 1, 400.0, "to move with no torque"),
+        (lambda: grasp(torques=(0.0,)), 1, 400.0, "has an effort limit of 0"),
         (lambda: grasp(torques=(1.0, 1.0)), 1, 400.0, "1 joint names and 2 values"),
     ],
 )

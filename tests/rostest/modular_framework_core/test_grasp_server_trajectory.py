@@ -112,7 +112,7 @@ def test_a_hand_that_shuts_holds_nothing(hand: FakeHand) -> None:
     hand.obstacle = float("inf")
     state, flags, text = send(hand, GraspCommand.GRASP_STATE)
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
-    assert "without anything" in text
+    assert "without an object" in text
 
 
 def test_a_postgrasp_posture_is_reached(hand: FakeHand) -> None:

@@ -135,7 +135,7 @@ def test_max_torque_and_intensity_bound_the_torque(gripper: Gripper) -> None:
 def test_closing_on_nothing_is_no_grasp(gripper: Gripper) -> None:
     state, flags, text, _ = gripper.run(GraspCommand.GRASP_STATE, grasp())
     assert (state, flags) == (GoalStatus.ABORTED, (False, False, False))
-    assert "without anything between" in text
+    assert "without an object between" in text
 
 
 def test_a_blocked_pregrasp_is_a_failure(gripper: Gripper) -> None:

@@ -55,7 +55,7 @@ def log_start(event, context):
     [
         (f'ExecuteProcess(cmd=["false"], name="broken", on_exit=Shutdown()), {LONG}', 3, "broken"),
         (f'ExecuteProcess(cmd=["true"], on_exit=Shutdown(reason="done")), {LONG}', 0, "done"),
-        ('ExecuteProcess(cmd="exit 4", shell=True, name="broken")', 2, "cmd is a single text"),
+        ('ExecuteProcess(cmd="exit 4", shell=True, name="broken")', 2, "cmd is a single string"),
         ('ExecuteProcess(cmd=["exit 4"], shell=True, name="broken")', 3, "everything has ended; failed: broken"),
         ('ExecuteProcess(cmd=["/no/such/program"])', 2, "/no/such/program"),
         ('ExecuteProcess(cmd=["true"], output="skreen")', 2, "did you mean 'screen'"),

@@ -69,12 +69,12 @@ def test_a_description_that_is_no_xml_is_named() -> None:
     ("names", "positions", "hint"),
     [
         ([], [], "at least one"),
-        (["f"], [], "as many"),
+        (["f"], [], "must be equal"),
         (["f", "f"], [0.1, 0.1], "twice"),
         (["a"], [0.1], "no active joint"),
         (["g"], [0.1], "no active joint"),
-        (["f"], [2.5], "limits"),
-        (["f"], [float("nan")], "limits"),
+        (["f"], [2.5], "the target is 2.5; allowed"),
+        (["f"], [float("nan")], "the target is nan"),
     ],
 )
 def test_a_posture_that_does_not_fit_the_hand_is_refused(names: list[str], positions: list[float], hint: str) -> None:
