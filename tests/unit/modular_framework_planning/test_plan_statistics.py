@@ -193,7 +193,7 @@ def test_the_sentence_names_the_longest_part_and_the_bodies_in_the_way() -> None
         "narrow passage between 'gripper_link' and 'shelf_3'"
     )
     wide = replace(slow, checks={"search": replace(counts, touching_by_bounds=920, free_by_bounds=35_160)})
-    assert wide.summary.endswith("2% refused: most often 'gripper_link' and 'shelf_3' touched")
+    assert wide.summary.endswith("2% in collision: most often 'gripper_link' and 'shelf_3'")
     assert replace(slow, checks={}).summary == "search took 310 of 320 ms"
     assert PlanStatistics().summary == ""
     assert PlanningError(ErrorCode.FAILURE, "no plan").statistics is None
