@@ -107,8 +107,8 @@ def test_jumps_end_the_line_and_name_the_joint(solver: InverseKinematics, jumps:
     [
         ({"max_step_m": 0.0}, "max_step is 0.0"),
         ({"max_step_m": float("nan")}, "max_step is nan"),
-        ({"max_step_m": 1e-9}, "at most 50000 are followed"),
-        ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: 50001; at most 50000"),
+        ({"max_step_m": 1e-9}, "steps; allowed: at most 50000"),
+        ({"waypoints": [pin.SE3.Identity()] * 50_001}, "waypoints: got 50001; allowed: at most 50000"),
         ({"waypoints": []}, "at least one pose"),
         ({"jumps": JumpThresholds(factor=-1.0)}, "'factor' is -1.0"),
     ],
