@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from modular_framework_description.catalogue import read_catalogue
-from modular_framework_description.scene_writer import scene_text
-from modular_framework_description.sdf_world import read_world
+from modular_framework_description.scene_writer import world_scene_text
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.sdf_reader import read_world as read_simulated_world
+from modular_framework_simulation.models.sdf_reader import read_world
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -83,7 +82,7 @@ def test_moments_of_inertia_are_those_of_the_evenly_filled_shape(package: Path, 
 
 def simulated(package: Path, name: str, tmp_path: Path) -> PhysicsWorld:
     resources = Resources((package / "models",), lambda _: "", ())
-    read = read_simulated_world(package / "worlds" / f"{name}.world", resources)
+    read = read_world(package / "worlds" / f"{name}.world", resources)
     world = PhysicsWorld(PhysicsSettings(), ConvexParts(tmp_path), read.gravity, log=lambda _: None)
     for model in read.models:
         world.spawn(model)
@@ -108,5 +107,5 @@ def test_a_world_stands_still_when_simulated(package: Path, name: str, tmp_path:
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_a_world_has_its_scene(package: Path, name: str) -> None:
-    links = read_world(package / "worlds" / f"{name}.world", package / "models")
-    assert scene_text(name, links) == (package / "scenes" / f"{name}.scene").read_text()
+    text = world_scene_text(package / "worlds" / f"{name}.world", package / "models")
+    assert text == (package / "scenes" / f"{name}.scene").read_text()

@@ -132,12 +132,6 @@ def _world_file(text: str, folder: Path) -> None:
     read_world(_file(folder, "table.world", text), Resources((), str))
 
 
-def _world_to_scene(text: str, folder: Path) -> None:
-    from modular_framework_description.sdf_world import read_world
-
-    read_world(_file(folder, "table.world", text), folder)
-
-
 def _mesh(text: str, folder: Path) -> None:
     from modular_framework_urdf.mesh_reader import read_mesh
 
@@ -179,7 +173,6 @@ READERS = (
     _simulated_sdf,
     _simulated_urdf,
     _world_file,
-    _world_to_scene,
     _mesh,
     _commander,
     _xacro,

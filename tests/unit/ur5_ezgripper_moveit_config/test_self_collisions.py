@@ -12,7 +12,9 @@ import pinocchio
 import pytest
 import rospkg
 
-from modular_framework_description.sdf_world import read_world
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.sdf_reader import read_world
+from modular_framework_simulation.models.sdf_resources import Resources
 
 # Arm states a task may name [rad], in chain order; the framework ships them as configuration.
 NAMED_STATES = {
@@ -86,23 +88,30 @@ def test_no_pair_that_can_collide_is_left_out(urdf, model, srdf) -> None:
     assert frozenset(("forearm_link", "ezgripper_palm_link")) in collided
 
 
+def coal_shape(geometry: specs.Geometry) -> coal.ShapeBase:
+    match geometry:
+        case specs.Box():
+            return coal.Box(*geometry.size)
+        case specs.Cylinder():
+            return coal.Cylinder(geometry.radius, geometry.length)
+        case specs.Plane():
+            return coal.Halfspace(np.array(geometry.normal), 0.0)
+    raise AssertionError(geometry)
+
+
 @pytest.fixture(scope="module")
 def scene_checker(urdf, model, srdf) -> Checker:
     folder = Path(rospkg.RosPack().get_path("modular_framework_description"))
     checker = Checker(urdf, model)
-    makers = {
-        "box": lambda size: coal.Box(*size),
-        "cylinder": lambda size: coal.Cylinder(*size),
-        "plane": lambda size: coal.Halfspace(np.array(size), 0.0),
-    }
-    for link in read_world(folder / "worlds" / "ur5_setup.world", folder / "models"):
-        for index, shape in enumerate(link.shapes):
-            pose = pinocchio.SE3(shape.pose)
-            name = f"{link.object_id}_{index}"
-            checker.geometry.addGeometryObject(
-                pinocchio.GeometryObject(name, 0, 0, pose, makers[shape.kind](shape.size))
-            )
-            checker.names.append(link.object_id)
+    world = read_world(folder / "worlds" / "ur5_setup.world", Resources((folder / "models",)))
+    for model_spec, link in ((model, link) for model in world.models for link in model.links):
+        for index, collision in enumerate(link.collisions):
+            pose = model_spec.pose @ link.pose @ collision.pose
+            placement = pinocchio.XYZQUATToSE3(np.array([*pose.position, *pose.quaternion]))
+            name = f"{model_spec.name}__{link.name}"
+            shape = coal_shape(collision.geometry)
+            checker.geometry.addGeometryObject(pinocchio.GeometryObject(f"{name}_{index}", 0, 0, placement, shape))
+            checker.names.append(name)
     checker.add_pairs(set(disabled_pairs(srdf)))
     return checker
 
