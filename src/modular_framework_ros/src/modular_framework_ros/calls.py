@@ -75,19 +75,23 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
                 ) from error
 
 
-def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> Any:
+def call_service(
+    proxy: rospy.ServiceProxy, request: Any, timeout_s: float, stop_requested: Callable[[], bool] = stop_requested
+) -> Any:
     """Calls a service.
 
     Args:
         proxy: Proxy of the service.
         request: Request message.
-        timeout_s: Maximum wait for the response [s of real time].
+        timeout_s: Maximum wait for the response [s of real time]; may be infinite.
+        stop_requested: Function polled during the wait; the wait ends when it returns True.
 
     Returns:
         The response message.
 
     Raises:
-        CallError: The service is absent, rejected the call or did not respond in time, or the task was asked to stop.
+        CallError: The service is absent, rejected the call or did not respond in time, the request has a value of the
+            wrong type, or the task was asked to stop.
     """
     answers: list[Any] = []
     errors: list[Exception] = []
@@ -96,7 +100,7 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
     def call() -> None:
         try:
             answers.append(proxy(request))
-        except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+        except Exception as error:  # whatever it is, the caller reports it
             errors.append(error)
         finally:
             done.set()

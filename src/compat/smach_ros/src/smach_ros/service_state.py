@@ -3,41 +3,21 @@
 
 from __future__ import annotations
 
-import threading
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rospy
 
 import smach
+from modular_framework_ros.calls import CallError, call_service
 from smach_ros.message_exchange import ExchangeError, MessageSink, MessageSource, ServerCallState
-from smach_ros.waiting import POLL_PERIOD_S, WallTimeLimit, seconds
+from smach_ros.waiting import seconds
 
 __all__ = ["ServiceState"]
 
 PROBE_TIME_S = 0.25
 """Maximum duration of one check for the service [s], which bounds the reaction to a request to stop."""
-
-
-class _Call(threading.Thread):
-    """A service call in a thread that can be abandoned."""
-
-    def __init__(self, proxy: rospy.ServiceProxy, request: Any) -> None:
-        super().__init__(name=f"call {proxy.resolved_name}", daemon=True)
-        self._proxy = proxy
-        self._request = request
-        self.ended = threading.Event()
-        self.response: Any = None
-        self.error: Exception | None = None
-
-    def run(self) -> None:
-        """Body of the thread."""
-        try:
-            self.response = self._proxy(self._request)
-        except Exception as error:  # the state reports any error
-            self.error = error
-        finally:
-            self.ended.set()
 
 
 class ServiceState(ServerCallState):
@@ -95,7 +75,8 @@ class ServiceState(ServerCallState):
         self._service_name = service_name
         self._service_spec = service_spec
         self._server_wait_timeout_s = seconds("server_wait_timeout", server_wait_timeout)
-        self._exec_timeout_s = seconds("exec_timeout", exec_timeout)
+        limit_s = seconds("exec_timeout", exec_timeout)
+        self._exec_timeout_s = math.inf if limit_s is None else limit_s
         empty_request, empty_response = _empty_messages(service_name, service_spec)
         on_request = self._user_callback("request_cb", request_cb, request_cb_args, request_cb_kwargs)
         on_response = self._user_callback("response_cb", response_cb, response_cb_args, response_cb_kwargs)
@@ -114,12 +95,16 @@ class ServiceState(ServerCallState):
                 self._server_wait_timeout_s,
                 "it was not advertised",
             ):
-                call = _Call(rospy.ServiceProxy(self._service_name, self._service_spec), self._source.make(userdata))
-                if self._wait_for_answer(call):
-                    chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), call.response)
+                proxy, request = rospy.ServiceProxy(self._service_name, self._service_spec), self._source.make(userdata)
+                if not self._stopped():
+                    response = call_service(proxy, request, self._exec_timeout_s, self._stopped)
+                    chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), response)
                     return "succeeded" if chosen is None else chosen
         except ExchangeError as error:
             return self._abort(f"service '{self._service_name}': {error}")
+        except CallError as error:
+            if not self._stopped():
+                return self._abort(str(error))
         return self._preempted(f"service '{self._service_name}': asked to stop before it answered")
 
     def _is_advertised(self) -> bool:
@@ -127,25 +112,6 @@ class ServiceState(ServerCallState):
             rospy.wait_for_service(self._service_name, PROBE_TIME_S)
         except rospy.ROSException:
             return False
-        return True
-
-    def _wait_for_answer(self, call: _Call) -> bool:
-        """Calls the service; returns False if the state is requested to stop before the response.
-
-        Raises:
-            ExchangeError: The call failed or exceeded its time limit.
-        """
-        limit = WallTimeLimit(self._exec_timeout_s)
-        if self._stopped():
-            return False
-        call.start()
-        while not call.ended.wait(POLL_PERIOD_S):
-            if self._stopped():
-                return False
-            if limit.over():
-                raise ExchangeError(f"it did not answer within {self._exec_timeout_s} s")
-        if call.error is not None:
-            raise ExchangeError(f"the call failed: {call.error}")
         return True
 
 
