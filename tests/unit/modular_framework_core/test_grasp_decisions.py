@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_core.commander.robot_groups import RobotModelError, read_group, read_joints
+from modular_framework_core.commander.robot_groups import RobotModelError, read_group
 from modular_framework_core.grasping.grasp_server import (
     GraspCommandError,
     Outcome,
@@ -47,11 +47,11 @@ def test_groups_hold_their_active_joints_in_order_and_know_their_tip() -> None:
     assert read_group(URDF, SRDF, "all").joint_names == ("a", "b", "f")
     assert HAND.joint_names == ("f",)
     assert CLOSED == {"f": 1.9}
-    assert read_joints(URDF)["b"].upper == float("inf")
+    assert arm.joint("b").upper == float("inf")
 
 
 @pytest.mark.parametrize(
-    ("group", "hint"), [("nothing", "no planning group 'nothing'.*arm"), ("odd", "zz"), ("loop", "contains itself")]
+    ("group", "hint"), [("nothing", "no group 'nothing'.*arm"), ("odd", "zz"), ("loop", "contains itself")]
 )
 def test_a_wrong_group_is_named(group: str, hint: str) -> None:
     with pytest.raises(RobotModelError, match=hint):
@@ -61,7 +61,7 @@ def test_a_wrong_group_is_named(group: str, hint: str) -> None:
 def test_a_description_that_is_no_xml_is_named() -> None:
     with pytest.raises(RobotModelError, match="URDF"):
         read_group("<robot", SRDF, "arm")
-    with pytest.raises(RobotModelError, match="no chain"):
+    with pytest.raises(RobotModelError, match="'moon' is not below link 'base'"):
         read_group(URDF, SRDF.replace('tip_link="palm"', 'tip_link="moon"'), "arm")
 
 

@@ -93,9 +93,9 @@ def _core_bounds(text: str, _folder: Path) -> None:
 
 
 def _core_groups(text: str, _folder: Path) -> None:
-    from modular_framework_core.commander.robot_groups import read_joints
+    from modular_framework_core.commander.robot_groups import read_group
 
-    read_joints(text)
+    read_group(text, "<robot/>", "arm")
 
 
 def _core_gripper(text: str, _folder: Path) -> None:

@@ -144,7 +144,7 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
         ),
         (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is not a movable joint"),
         (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
-        (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
+        (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "names the link 'nowhere'"),
         (
             URDF,
             SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'),

@@ -11,6 +11,7 @@ from typing import Any
 
 from modular_framework_urdf import srdf_reader
 from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.planning_groups import GroupError, KinematicTree
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription, VirtualJoint, read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -95,6 +96,7 @@ class RobotModel:
         self.joints = {joint.name: joint for joint in ordered}
         self.links = tuple(joint.child for joint in ordered)
         self._parent_joint = {joint.child: joint for joint in ordered}
+        self._tree = KinematicTree({joint.name: (joint.parent, joint.child) for joint in ordered})
         self.passive = semantics.passive_joints
         self._semantics = semantics
         self.groups = {spec.name: self._group(spec) for spec in semantics.groups.values()}
@@ -111,15 +113,10 @@ class RobotModel:
 
     def chain(self, base: str, tip: str) -> list[Joint]:
         """Returns the joints from a link to one of its descendants."""
-        joints: list[Joint] = []
-        link = tip
-        while link != base:
-            joint = self._parent_joint.get(link)
-            if joint is None or joint.parent == link:  # a virtual joint's parent frame may equal its child link
-                raise RobotModelError(f"link '{tip}' is not below link '{base}' in robot '{self.name}'")
-            joints.append(joint)
-            link = joint.parent
-        return joints[::-1]
+        try:
+            return [self.joints[name] for name in self._tree.chain(base, tip)]
+        except GroupError as error:
+            raise RobotModelError(f"{error} in robot '{self.name}'") from error
 
     def complete(self, positions: Mapping[str, float]) -> dict[str, float]:
         """Returns the positions of the model's joints in order, with computed mimic joints; skips unknown joints."""
@@ -162,7 +159,10 @@ class RobotModel:
 
     def _group(self, spec: GroupSpec) -> Group:
         name = spec.name
-        wanted = self._members(spec, frozenset())
+        try:
+            wanted = set(self._tree.group_joints(name, self._semantics))
+        except GroupError as error:
+            raise RobotModelError(f"{error} in robot '{self.name}'") from error
         joints = tuple(joint for joint in self.joints.values() if joint.name in wanted)
         links = tuple(joint.child for joint in joints)
         is_chain = (
@@ -184,31 +184,12 @@ class RobotModel:
         chosen = min(named or possible, key=lambda group: len(group.joints), default=None)
         return EndEffector(spec.group, chosen.name if chosen else "", link)
 
-    def _members(self, spec: GroupSpec, above: frozenset[str]) -> set[str]:
-        """Returns the names of a group's joints, including those of its subgroups."""
-        if spec.name in above:
-            raise RobotModelError(f"SRDF: group '{spec.name}' contains itself; remove one <group> element")
-        members = set(spec.joints) | {self._joint_above(link).name for link in spec.links}
-        for base, tip in spec.chains:
-            members.update(joint.name for joint in self.chain(base, tip))
-        for name in spec.subgroups:
-            inner = self._semantics.groups.get(name)
-            if inner is None:
-                raise RobotModelError(f"SRDF: group '{spec.name}' contains the unknown group '{name}'")
-            members |= self._members(inner, above | {spec.name})
-        return members
-
     def _follows(self, sooner: Joint, later: Joint) -> bool:
         """Returns whether only fixed joints lie between two joints."""
         link = later.parent
         while link not in (sooner.child, self.root_link) and self._parent_joint[link].kind == "fixed":
             link = self._parent_joint[link].parent
         return link == sooner.child
-
-    def _joint_above(self, link: str) -> Joint:
-        if link not in self._parent_joint:
-            raise RobotModelError(f"SRDF: link '{link}' is not a link of robot '{self.name}'")
-        return self._parent_joint[link]
 
 
 def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:

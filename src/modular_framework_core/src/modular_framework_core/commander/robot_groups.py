@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from modular_framework_urdf.robot import MOVABLE_KINDS
+from modular_framework_urdf.planning_groups import GroupError, KinematicTree
 from modular_framework_urdf.robot import Joint as UrdfJoint
 from modular_framework_urdf.srdf_reader import GroupSpec, read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -20,34 +20,21 @@ class RobotModelError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """A joint of the robot.
+    """An active joint of a group.
 
     Attributes:
         name: Name of the joint.
-        kind: URDF type.
-        parent: Parent link.
-        child: Child link.
         lower: Lower position limit [rad or m]; minus infinity without a limit.
         upper: Upper position limit [rad or m]; infinity without a limit.
         effort: Effort limit [N m or N]; infinity without a limit.
-        mimics: Leading joint of a mimic joint; "" for an independent joint.
         velocity: Velocity limit [rad/s or m/s]; infinity without a limit.
     """
 
     name: str
-    kind: str
-    parent: str
-    child: str
-    lower: float
-    upper: float
-    effort: float
-    mimics: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    effort: float = math.inf
     velocity: float = math.inf
-
-    @property
-    def is_active(self) -> bool:
-        """Whether the joint is movable and not a mimic joint."""
-        return self.kind in MOVABLE_KINDS and not self.mimics
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,31 +72,14 @@ class Group:
         return tuple(joint.name for joint in self.joints)
 
 
-def read_joints(urdf: str) -> dict[str, Joint]:
-    """Returns the joints of a URDF text by name, in file order.
-
-    Raises:
-        RobotModelError: The text is not a URDF.
-    """
-    try:
-        robot = read_urdf(urdf, "robot_description (URDF)")
-    except XmlError as error:
-        raise _unreadable(error) from error
-    return {joint.name: _joint(joint) for joint in robot.joints if joint.parent and joint.child}
-
-
 def _joint(joint: UrdfJoint) -> Joint:
     limit = joint.limit
     bounded = limit is not None and joint.kind != "continuous"
     return Joint(
         name=joint.name,
-        kind=joint.kind,
-        parent=joint.parent,
-        child=joint.child,
         lower=limit.lower if limit is not None and bounded else -math.inf,
         upper=limit.upper if limit is not None and bounded else math.inf,
         effort=math.inf if limit is None or limit.effort is None else limit.effort,
-        mimics=joint.mimic.leader if joint.mimic is not None else "",
         velocity=math.inf if limit is None or limit.velocity is None else limit.velocity,
     )
 
@@ -125,59 +95,23 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
     Raises:
         RobotModelError: A text is invalid, the group is unknown, or it refers to an unknown group, joint or link.
     """
-    joints = read_joints(urdf)
     try:
+        robot = read_urdf(urdf, "robot_description (URDF)")
         semantics = read_srdf(srdf, "robot_description_semantic (SRDF)")
     except XmlError as error:
-        raise _unreadable(error) from error
-    names, tip = _collect(name, semantics.groups, joints, ())
-    active = [joints[joint] for joint in dict.fromkeys(names) if joints[joint].is_active]
+        raise RobotModelError(f"{error}. Check the launch file that loads it.") from error
+    joints = {joint.name: joint for joint in robot.joints if joint.parent and joint.child}
+    tree = KinematicTree({joint.name: (joint.parent, joint.child) for joint in joints.values()})
+    try:
+        members = [joints[member] for member in tree.group_joints(name, semantics) if member in joints]
+    except GroupError as error:
+        raise RobotModelError(str(error)) from error
+    active = tuple(_joint(joint) for joint in members if joint.movable and joint.mimic is None)
     states = {state: dict(positions) for state, positions in semantics.group_states.get(name, {}).items()}
-    return Group(name, tuple(active), tip, states)
+    return Group(name, active, _tip_link(semantics.groups[name], semantics.groups), states)
 
 
-def _collect(
-    name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint], parents: tuple[str, ...]
-) -> tuple[list[str], str]:
-    if name not in groups:
-        raise RobotModelError(f"There is no planning group '{name}'; the SRDF has {sorted(groups)}.")
-    if name in parents:
-        raise RobotModelError(f"Planning group '{name}' contains itself through {list(parents)}.")
-    by_child = {joint.child: joint for joint in joints.values()}
-    names: list[str] = []
-    tip = ""
-    for member in groups[name].members:
-        match member.kind:
-            case "chain":
-                tip = member.tip_link
-                names += _chain(member.base_link, tip, by_child)
-            case "joint":
-                if member.name not in joints:
-                    raise RobotModelError(
-                        f"Planning group '{name}' names the joint '{member.name}', which the URDF lacks."
-                    )
-                names.append(member.name)
-            case "link":
-                parent = by_child.get(member.name)
-                names += [parent.name] if parent is not None else []
-            case "group":
-                subgroup_names, subgroup_tip = _collect(member.name, groups, joints, (*parents, name))
-                names += subgroup_names
-                tip = tip or subgroup_tip
-    return names, tip
-
-
-def _chain(base: str, tip: str, by_child: dict[str, Joint]) -> list[str]:
-    names: list[str] = []
-    link = tip
-    while link != base:
-        joint = by_child.get(link)
-        if joint is None:
-            raise RobotModelError(f"The URDF has no chain of joints from link '{base}' to link '{tip}'.")
-        names.append(joint.name)
-        link = joint.parent
-    return names[::-1]
-
-
-def _unreadable(error: XmlError) -> RobotModelError:
-    return RobotModelError(f"{error}. Check the launch file that loads it.")
+def _tip_link(spec: GroupSpec, groups: Mapping[str, GroupSpec]) -> str:
+    """Returns the tip of a group's last chain, or of its first subgroup with a chain; "" without a chain."""
+    own_tips = [tip for _, tip in reversed(spec.chains)]
+    return next(filter(None, own_tips + [_tip_link(groups[name], groups) for name in spec.subgroups]), "")

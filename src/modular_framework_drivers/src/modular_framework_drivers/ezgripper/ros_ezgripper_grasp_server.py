@@ -146,9 +146,7 @@ class EzGripperManipulator:
 
 def gripper_group(joint: str) -> Group:
     """Returns the planning group of the gripper: one joint, with efforts as fractions of the full torque."""
-    knuckle = Joint(
-        name=joint, kind="revolute", parent="", child="", lower=0.0, upper=CLOSED_POSITION, effort=1.0, mimics=""
-    )
+    knuckle = Joint(name=joint, lower=0.0, upper=CLOSED_POSITION, effort=1.0)
     return Group("ezgripper", (knuckle,), "", {"closed": {joint: CLOSED_POSITION}})
 
 

@@ -88,7 +88,7 @@ class InverseKinematics:
 
     def _try_closed_form(self) -> ClosedForm | None:
         chain_joints_between = [
-            name for name in self.model.chain_joints(self.base_link, self._last_link) if name in self.model.index
+            name for name in self.model.tree.chain(self.base_link, self._last_link) if name in self.model.index
         ]
         if self.settings.solver == NUMERIC or chain_joints_between != list(self.group.joints):
             return None

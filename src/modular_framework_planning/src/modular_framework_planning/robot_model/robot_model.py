@@ -24,6 +24,7 @@ from modular_framework_planning.robot_model.urdf_document import (
     package_resolver,
 )
 from modular_framework_urdf.joint_limits import DEFAULT_ACCELERATION, DEFAULT_VELOCITY, JointLimits, overwritten
+from modular_framework_urdf.planning_groups import GroupError, KinematicTree
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription
 
 GOAL_BOUNDS_TOLERANCE = 1.0e-4  # bounds violation of a goal that is clipped, such as 3.1416 for pi [rad or m]
@@ -122,12 +123,12 @@ class RobotModel:
             for name, mimic in self.document.mimics.items()
         ]
         self.link_geometries = self._load_geometry()
-        self._tree = {
-            child: (parent, joint)
-            for joint, child in self.document.joint_children.items()
-            for parent in (self.document.joint_parents[joint],)
-        }
-        self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
+        children = self.document.joint_children
+        self.tree = KinematicTree({joint: (self.document.joint_parents[joint], children[joint]) for joint in children})
+        try:
+            self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
+        except GroupError as error:
+            raise ModelError(str(error)) from error
 
     def _expanded(self, joints: Iterable[str]) -> set[str]:
         """Returns joint names, with the base or any of its variables replaced by all its variables."""
@@ -166,23 +167,6 @@ class RobotModel:
             ]
         return tuple(result)
 
-    def chain_joints(self, base_link: str, tip_link: str) -> list[str]:
-        """Returns the joints from base to tip, including fixed joints.
-
-        Raises:
-            ModelError: The tip is not a descendant of the base.
-        """
-        joints: list[str] = []
-        link = tip_link
-        while link != base_link:
-            if link not in self._tree:
-                raise ModelError(
-                    f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' is not a descendant of '{base_link}'"
-                )
-            link, joint = self._tree[link]
-            joints.append(joint)
-        return joints[::-1]
-
     def is_carried(self, link: str, carrier: str) -> bool:
         """Checks that only fixed and passive joints lie between a link and its carrier."""
         path, carrier_joints = self.joints_above(link), self.joints_above(carrier)
@@ -195,23 +179,8 @@ class RobotModel:
         joint = self.pin_model.frames[self.frame_ids[link]].parentJoint
         return [self.pin_model.names[index] for index in self.pin_model.supports[joint]]
 
-    def _group_joints(self, spec: GroupSpec, seen: tuple[str, ...] = ()) -> set[str]:
-        if spec.name in seen:
-            raise ModelError(f"SRDF group '{spec.name}': contains itself through {' -> '.join(seen)}")
-        parent_joint = {child: joint for joint, child in self.document.joint_children.items()}
-        joints = self._expanded((*spec.joints, *(parent_joint[link] for link in spec.links if link in parent_joint)))
-        virtual = {joint.name for joint in self.semantics.virtual_joints}
-        unknown = [name for name in spec.joints if name not in self.document.joint_kinds and name not in virtual]
-        unknown += [link for link in spec.links if link not in self.document.links]
-        if unknown:
-            raise ModelError(f"SRDF group '{spec.name}' names {', '.join(unknown)}, not in the URDF")
-        for base, tip in spec.chains:
-            joints |= set(self.chain_joints(base, tip))
-        for name in spec.subgroups:
-            if name not in self.semantics.groups:
-                raise ModelError(f"SRDF group '{spec.name}': subgroup '{name}' is not defined")
-            joints |= self._group_joints(self.semantics.groups[name], (*seen, spec.name))
-        return joints
+    def _group_joints(self, spec: GroupSpec) -> set[str]:
+        return self._expanded(self.tree.group_joints(spec.name, self.semantics))
 
     def _build_group(self, spec: GroupSpec) -> JointGroup:
         members = self._group_joints(spec)
@@ -228,15 +197,15 @@ class RobotModel:
             return spec.chains[0]
         for name in spec.subgroups:
             subgroup = self.semantics.groups[name]
-            if len(subgroup.chains) == 1 and set(joints) <= set(self.chain_joints(*subgroup.chains[0])):
+            if len(subgroup.chains) == 1 and set(joints) <= set(self.tree.chain(*subgroup.chains[0])):
                 return subgroup.chains[0]
         if not joints:
             return "", ""
         base = self.document.joint_parents[joints[0]]
         tip = self.document.joint_children[joints[-1]]
         try:
-            movable = [name for name in self.chain_joints(base, tip) if name in self.index]
-        except ModelError:
+            movable = [name for name in self.tree.chain(base, tip) if name in self.index]
+        except GroupError:
             return "", ""
         return (base, self._last_fixed_link(tip, spec)) if movable == list(joints) else ("", "")
 
