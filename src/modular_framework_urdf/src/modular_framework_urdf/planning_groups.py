@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from modular_framework_urdf.srdf_reader import SemanticDescription
 
@@ -24,6 +24,12 @@ class KinematicTree:
         self._links = {link for pair in links_of.values() for link in pair}
         self._joints = links_of.keys()
 
+    def up(self, link: str) -> Iterator[tuple[str, str]]:
+        """Yields the joints from a link up to the root, each with its parent link."""
+        while link in self._above and self._above[link][1] != link:  # a virtual joint may connect equal names
+            joint, link = self._above[link]
+            yield joint, link
+
     def chain(self, base: str, tip: str) -> list[str]:
         """Returns the joints from a link to one of its descendants, including fixed joints.
 
@@ -31,14 +37,13 @@ class KinematicTree:
             GroupError: The tip is not a descendant of the base.
         """
         joints: list[str] = []
-        link = tip
-        while link != base:
-            joint, parent = self._above.get(link, ("", link))
-            if parent == link:  # also for a virtual joint whose parent frame has the name of its child link
-                raise GroupError(f"link '{tip}' is not below link '{base}'")
+        if base == tip:
+            return joints
+        for joint, parent in self.up(tip):
             joints.append(joint)
-            link = parent
-        return joints[::-1]
+            if parent == base:
+                return joints[::-1]
+        raise GroupError(f"link '{tip}' is not below link '{base}'")
 
     def group_joints(self, name: str, semantics: SemanticDescription, parents: tuple[str, ...] = ()) -> list[str]:
         """Returns the joints of a group and of its subgroups in the order of the SRDF, each once.

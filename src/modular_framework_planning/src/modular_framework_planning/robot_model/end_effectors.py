@@ -70,11 +70,11 @@ def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
 
 def hand_links(model: RobotModel, effector: EndEffector) -> tuple[str, ...]:
     """Returns the links of the end effector's group, and the links between this group and the parent link."""
-    parents = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
     links = list(model.group(effector.group).links)
     for link in tuple(links):
-        while model.has_link(parents.get(link, "")) and parents[link] != effector.parent_link:
-            link = parents[link]
-            if link not in links:
-                links.append(link)
+        for _, parent in model.tree.up(link):
+            if parent == effector.parent_link or not model.has_link(parent):
+                break
+            if parent not in links:
+                links.append(parent)
     return tuple(links)

@@ -35,9 +35,10 @@ def finger_of(model: RobotModel, gripper: Gripper, link: str) -> str:
         gripper: Gripper of the finger.
         link: Link of the finger.
     """
-    parents = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
-    while parents.get(link, gripper.palm) != gripper.palm:
-        link = parents[link]
+    for _, parent in model.tree.up(link):
+        if parent == gripper.palm:
+            break
+        link = parent
     return link
 
 

@@ -104,17 +104,14 @@ def adjacent_pairs(model: RobotModel, links: set[str]) -> set[Pair]:
         model: Robot model.
         links: Links with shapes.
     """
-    document = model.document
-    parents = {child: (document.joint_parents[joint], joint) for joint, child in document.joint_children.items()}
     pairs = set()
     for link in links:
-        moving, ancestor = 0, link
-        while ancestor in parents and moving < 2:
-            ancestor, joint = parents[ancestor]
-            moving += document.joint_kinds[joint] != "fixed"
-            if ancestor in links:
-                if moving < 2:
-                    pairs.add(pair_of(link, ancestor))
+        moving = 0
+        for joint, ancestor in model.tree.up(link):
+            moving += model.document.joint_kinds[joint] != "fixed"
+            if moving < 2 and ancestor in links:
+                pairs.add(pair_of(link, ancestor))
+            if moving == 2 or ancestor in links:
                 break
     return pairs
 
@@ -179,15 +176,7 @@ def _descend(
 
 def _joints_between(model: RobotModel, pair: Pair) -> Array:
     """Returns the indices of the joints that determine the relative pose of two links, including leading joints."""
-    document = model.document
-    parents = {child: (document.joint_parents[joint], joint) for joint, child in document.joint_children.items()}
-    paths: list[set[str]] = []
-    for link in pair:
-        path = set()
-        while link in parents:
-            link, joint = parents[link]
-            path.add(joint)
-        paths.append(path)
-    names = paths[0] ^ paths[1]
-    names |= {document.mimics[name].leader for name in names if name in document.mimics}
+    first, second = ({joint for joint, _ in model.tree.up(link)} for link in pair)
+    names, mimics = first ^ second, model.document.mimics
+    names |= {mimics[name].leader for name in names if name in mimics}
     return np.array(sorted(model.index[name] for name in names if name in model.index), dtype=np.int64)
