@@ -23,6 +23,8 @@ from modular_framework_ros.stop_requests import stop_requested
 
 POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
+PROBE_TIME_S = 0.2
+"""Maximum duration of one check for a service [s], which bounds the reaction to a stop request."""
 
 CANCEL_WAIT_S = 0.5
 """Maximum wait for the result of a cancelled goal [s]; a task must end within a second of a stop request."""
@@ -48,6 +50,15 @@ def wait_until(condition: Callable[[], bool], timeout_s: float, period_s: float 
     return True
 
 
+def is_advertised(service: str) -> bool:
+    """Returns whether a service is advertised, within ``PROBE_TIME_S``."""
+    try:
+        rospy.wait_for_service(service, PROBE_TIME_S)
+    except rospy.ROSException:
+        return False
+    return True
+
+
 def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
     """Waits for a service to be advertised.
 
@@ -61,7 +72,7 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
         if stop_requested():
             raise _stop_error(f"service '{proxy.resolved_name}'")
         try:
-            rospy.wait_for_service(proxy.resolved_name, max(0.05, min(0.2, end - time.monotonic())))
+            rospy.wait_for_service(proxy.resolved_name, max(0.05, min(PROBE_TIME_S, end - time.monotonic())))
             return
         except rospy.ROSException as error:
             if rospy.is_shutdown():

@@ -10,14 +10,11 @@ from typing import Any
 import rospy
 
 import smach
-from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.calls import CallError, call_service, is_advertised
 from smach_ros.message_exchange import ExchangeError, MessageSink, MessageSource, ServerCallState
 from smach_ros.waiting import seconds
 
 __all__ = ["ServiceState"]
-
-PROBE_TIME_S = 0.25
-"""Maximum duration of one check for the service [s], which bounds the reaction to a request to stop."""
 
 
 class ServiceState(ServerCallState):
@@ -91,7 +88,7 @@ class ServiceState(ServerCallState):
         try:
             if self._wait_for_server(
                 f"service '{self._service_name}'",
-                self._is_advertised,
+                lambda: is_advertised(self._service_name),
                 self._server_wait_timeout_s,
                 "it was not advertised",
             ):
@@ -106,13 +103,6 @@ class ServiceState(ServerCallState):
             if not self._stopped():
                 return self._abort(str(error))
         return self._preempted(f"service '{self._service_name}': asked to stop before it answered")
-
-    def _is_advertised(self) -> bool:
-        try:
-            rospy.wait_for_service(self._service_name, PROBE_TIME_S)
-        except rospy.ROSException:
-            return False
-        return True
 
 
 def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:

@@ -31,7 +31,7 @@ from modular_framework_core.launching.robot_controllers_spawner import (
     read_controller_file,
     with_joint_states,
 )
-from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.calls import CallError, call_service, is_advertised
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.start_up import start_timeout
 
@@ -144,24 +144,15 @@ class RobotControllersSpawner:
 
     def _call(self, name: str, kind: Any, *arguments: Any) -> Any:
         service = rospy.resolve_name(f"controller_manager/{name}")
-        proxy = rospy.ServiceProxy(service, kind)
         self._wait(
-            lambda: self._available(proxy),
+            lambda: is_advertised(service),
             lambda: f"service {service}",
             "is the simulation or the node robot_hw running?",
         )
         try:
-            return call_service(proxy, kind._request_class(*arguments), CALL_TIMEOUT_S)
+            return call_service(rospy.ServiceProxy(service, kind), kind._request_class(*arguments), CALL_TIMEOUT_S)
         except CallError as error:
             raise SpawnError(str(error)) from error
-
-    @staticmethod
-    def _available(proxy: rospy.ServiceProxy) -> bool:
-        try:
-            proxy.wait_for_service(timeout=0.2)
-        except rospy.ROSException:
-            return False
-        return True
 
     def _wait_for_hardware(self) -> None:
         topics = {name: rospy.get_param(f"/{name}/topic_to_wait_for", "") for name in self._hardware}

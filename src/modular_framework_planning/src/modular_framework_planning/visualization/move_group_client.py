@@ -29,7 +29,7 @@ from std_msgs.msg import String
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_ros.action_client import SteadyActionClient, is_connected
-from modular_framework_ros.calls import wait_until
+from modular_framework_ros.calls import CallError, wait_for_service, wait_until
 
 GOAL_TOLERANCE = 1.0e-4  # [rad or m]
 EXECUTION_MARGIN_S = 60.0
@@ -78,12 +78,9 @@ class MoveGroupClient:
         """Waits for move_group; raises PlanningError naming a missing endpoint."""
         for service in (self._scene, self._ik, self._validity, self._planners):
             try:
-                service.wait_for_service(timeout_s)
-            except rospy.ROSException as error:
-                raise PlanningError(
-                    ErrorCode.COMMUNICATION_FAILURE,
-                    f"service {service.resolved_name} was not offered within {timeout_s:.0f} s; is move_group running?",
-                ) from error
+                wait_for_service(service, timeout_s)
+            except CallError as error:
+                raise PlanningError(ErrorCode.COMMUNICATION_FAILURE, str(error)) from error
         for name, client in ((names.MOVE_ACTION, self._move), (names.EXECUTE_ACTION, self._execute)):
             if not wait_until(partial(is_connected, client), timeout_s):
                 raise PlanningError(

@@ -11,6 +11,7 @@ import rospy
 from gazebo_msgs import srv
 from std_srvs.srv import Empty
 
+from modular_framework_ros.calls import is_advertised
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.spawn_model_command import (
@@ -149,14 +150,7 @@ def _wait_for_model(command: SpawnCommand) -> None:
 
 
 def _wait_for_service(name: str) -> None:
-    def advertised() -> bool:
-        try:
-            rospy.wait_for_service(name, 0.2)
-        except rospy.ROSException:
-            return False
-        return True
-
-    if not wait_for_start(advertised, f"service '{name}' of the simulation"):
+    if not wait_for_start(lambda: is_advertised(name), f"service '{name}' of the simulation"):
         raise SpawnError(
             f"service '{name}' was not advertised within {start_timeout():g} s (parameter "
             "/start_timeout); start the simulation"

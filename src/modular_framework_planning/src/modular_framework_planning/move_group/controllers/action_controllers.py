@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Protocol
 
 import actionlib
@@ -22,8 +22,8 @@ from modular_framework_planning.trajectory_execution.controllers import (
     parse_controllers,
 )
 from modular_framework_ros.action_client import SteadyActionClient, is_connected
+from modular_framework_ros.calls import wait_until
 
-POLL_S = 0.01
 ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperCommandAction), strict=True))
 
 
@@ -109,17 +109,13 @@ class ActionControllers:
     def prepare(self, parts: Sequence[MotionPart]) -> None:
         """Waits for the actions; raises PlanningError naming a missing action."""
         for spec in (part.controller for part in parts):
-            # wall time, because simulated time stops while a simulation is paused
-            deadline = time.monotonic() + self._timeout_s
-            while not is_connected(self._client(spec)):
-                if time.monotonic() > deadline or rospy.is_shutdown():
-                    raise PlanningError(
-                        ErrorCode.CONTROL_FAILED,
-                        f"action {rospy.resolve_name(spec.action)} of "
-                        f"controller '{spec.name}' did not answer within {self._timeout_s:.1f} s; is "
-                        "the controller running?",
-                    )
-                rospy.rostime.wallsleep(POLL_S)
+            if not wait_until(partial(is_connected, self._client(spec)), self._timeout_s):
+                raise PlanningError(
+                    ErrorCode.CONTROL_FAILED,
+                    f"action {rospy.resolve_name(spec.action)} of "
+                    f"controller '{spec.name}' did not answer within {self._timeout_s:.1f} s; is "
+                    "the controller running?",
+                )
 
     def begin(self, part: MotionPart) -> RunningMotion:
         """Sends the goal."""

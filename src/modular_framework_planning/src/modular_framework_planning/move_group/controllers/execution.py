@@ -20,7 +20,6 @@ from modular_framework_planning.errors import ErrorCode, ModelError, PlanningErr
 from modular_framework_planning.messages.execution_messages import MotionPart, at_speed, check_trajectory, split
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.controllers.action_controllers import (
-    POLL_S,
     ActionControllers,
     ControllerManager,
     RunningMotion,
@@ -41,7 +40,7 @@ from modular_framework_planning.trajectory_execution.controllers import FAKE_KIN
 from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 from modular_framework_ros.allowed_names import nearest
-from modular_framework_ros.calls import wait_until
+from modular_framework_ros.calls import POLL_PERIOD_S, wait_until
 
 SETTLE_TIMEOUT_S = 1.0
 SETTLED_RAD = 1.0e-4
@@ -294,7 +293,7 @@ class TrajectoryExecution:
                 running = [item for item in running if not item[1].is_done()]
                 if stalls.are_over():
                     self._check_time([part for part, _ in running], (rospy.Time.now() - start).to_sec() - delay_s)
-                cancelled.wait(POLL_S)
+                cancelled.wait(POLL_PERIOD_S)
         finally:
             for _, motion in running:
                 motion.cancel()
