@@ -16,7 +16,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Trigger, TriggerRequest
 
 from modular_framework_benchmark.records.episode_settings import PlacedObject
-from modular_framework_ros.calls import call_service, request_service, wait_for_service
+from modular_framework_ros.calls import request_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SPAWN_SERVICE, REFEREE_SERVICE = "/gazebo/spawn_sdf_model", "/gazebo/referee"
@@ -38,12 +38,10 @@ def spawn(placed: PlacedObject) -> None:
         WorldError: The model does not exist, or the simulation rejects it.
         CallError: The simulation does not answer.
     """
-    proxy = rospy.ServiceProxy(SPAWN_SERVICE, SpawnModel)
-    wait_for_service(proxy, SERVICE_TIMEOUT_S)
     x, y, z, w = quaternion_from_rpy(*placed.rpy)
     pose = Pose(Point(*placed.xyz), Quaternion(x, y, z, w))
     request = SpawnModel._request_class(placed.name, _description(placed.model), "", pose, "world")
-    response = call_service(proxy, request, SERVICE_TIMEOUT_S)
+    response = request_service(SPAWN_SERVICE, SpawnModel, request, SERVICE_TIMEOUT_S)
     if not response.success:
         raise WorldError(f"object '{placed.name}' cannot be spawned: {response.status_message}")
 
