@@ -475,30 +475,19 @@ def check_samples(
                     if common < 0:
                         needed += motions[body] + motions[other]
                     else:
-                        needed += _motion_of(
-                            parents,
-                            prismatic,
-                            axes,
-                            change,
-                            signs,
-                            centres,
-                            spheres,
-                            body,
-                            body_joints[body],
-                            common,
-                        )
-                        needed += _motion_of(
-                            parents,
-                            prismatic,
-                            axes,
-                            change,
-                            signs,
-                            centres,
-                            spheres,
-                            other,
-                            body_joints[other],
-                            common,
-                        )
+                        for moved in (body, other):
+                            needed += _motion_of(
+                                parents,
+                                prismatic,
+                                axes,
+                                change,
+                                signs,
+                                centres,
+                                spheres,
+                                moved,
+                                body_joints[moved],
+                                common,
+                            )
                 if (
                     centre_distance(centres, body, other) - spheres[body, 3] - spheres[other, 3] - margins[pair]
                     >= needed
