@@ -22,6 +22,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
     column_fronts,
 )
 from modular_framework_core.grasp_generation.hand_axes import hand_axes
+from modular_framework_urdf.planning_groups import KinematicTree
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -263,7 +264,7 @@ class _Model:
             raise GripperGeometryError(str(error)) from error
         self.links = {link.name: link for link in robot.links}
         self.joints = {joint.name: joint for joint in robot.joints if joint.child}
-        self.parent_joint = {joint.child: name for name, joint in self.joints.items()}
+        self._tree = KinematicTree({name: (joint.parent, joint.child) for name, joint in self.joints.items()})
         self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
 
     def driven_joints(self, joint: str) -> set[str]:
@@ -280,16 +281,9 @@ class _Model:
 
     def moving_links(self, joint: str) -> list[str]:
         """Returns the links moved by a joint, by its mirrored joints, or by mimic joints of these joints."""
-        driven, moving = self.driven_joints(joint), []
-        for link in self.links:
-            name = self.parent_joint.get(link)
-            while name is not None:
-                mimic = self.joints[name].mimic
-                if name in driven or (mimic is not None and mimic.leader in driven):
-                    moving.append(link)
-                    break
-                name = self.parent_joint.get(self.joints[name].parent)
-        return moving
+        driven = self.driven_joints(joint)
+        driven |= {name for name, each in self.joints.items() if each.mimic is not None and each.mimic.leader in driven}
+        return [link for link in self.links if any(name in driven for name, _ in self._tree.up(link))]
 
     def hand_links(self, joint: str) -> list[str]:
         """Returns the moving links, their parent link, and all links fixed to the parent link."""
@@ -316,11 +310,8 @@ class _Model:
     def pose(self, link: str, state: dict[str, float]) -> Array:
         """Returns the pose of a link in the root link, shape (4, 4)."""
         transform = np.eye(4)
-        name = self.parent_joint.get(link)
-        while name is not None:
-            joint = self.joints[name]
-            transform = self._origins[name] @ _motion(joint, state) @ transform
-            name = self.parent_joint.get(joint.parent)
+        for name, _ in self._tree.up(link):
+            transform = self._origins[name] @ _motion(self.joints[name], state) @ transform
         return transform
 
 
