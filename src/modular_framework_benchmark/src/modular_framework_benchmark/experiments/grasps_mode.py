@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, count, named_values, setting, text
+from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, count, named_values, setting
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH
 from modular_framework_benchmark.experiments.robot_setting import ModelSettings
@@ -29,12 +29,12 @@ class GraspSettings(ModelSettings):
         max_checks: Maximum number of grasps whose reachability is checked.
     """
 
-    group: str = setting(text, "", required=True)
-    gripper_joint: str = setting(text, "", required=True)
-    method: str = setting(text, "", required=True)
+    group: str = setting(Reading.optional_text, "", required=True)
+    gripper_joint: str = setting(Reading.optional_text, "", required=True)
+    method: str = setting(Reading.optional_text, "", required=True)
     method_parameters: Mapping[str, Any] = setting(named_values("{finger_clearance: 0.01}"), {})
     objects: tuple[PlacedObject, ...] = setting(read_objects, (), required=True)
-    target: str = setting(text, "")
+    target: str = setting(Reading.optional_text, "")
     max_checks: int = setting(count(100_000), 40)
 
     @property

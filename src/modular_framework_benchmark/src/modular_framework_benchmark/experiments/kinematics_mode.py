@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_benchmark.experiments.mode import Mode, count, ros_parameters, seconds, setting, text
+from modular_framework_benchmark.experiments.mode import Mode, count, ros_parameters, setting
+from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.robot_setting import ModelSettings
 
 
@@ -23,10 +24,10 @@ class KinematicsSettings(ModelSettings):
         parameters: ROS parameters of the solver, keyed by full name.
     """
 
-    group: str = setting(text, "")
-    solver: str = setting(text, "")
+    group: str = setting(Reading.optional_text, "")
+    solver: str = setting(Reading.optional_text, "")
     poses: int = setting(count(), 100)
-    timeout: float = setting(seconds, 0.05)
+    timeout: float = setting(Reading.seconds, 0.05)
     parameters: Mapping[str, Any] = setting(ros_parameters, {})
 
     @property

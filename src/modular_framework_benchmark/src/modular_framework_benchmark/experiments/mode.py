@@ -12,10 +12,10 @@ from modular_framework_benchmark.experiments.reading import Reading, json_value
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, SceneObject
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, SettingsT
 from modular_framework_core.files.located_yaml import Mapping as NodeMapping
-from modular_framework_core.files.located_yaml import Node, Scalar
+from modular_framework_core.files.located_yaml import Node
 
-ReadValue = Callable[[Node, str, Reading], Any]
-"""Reader of a value, given its key; it adds faults, and returns None for an unreadable value."""
+ReadValue = Callable[[Reading, Node, str], Any]
+"""Reader of a value, given its key, such as a method of Reading; returns None for an unreadable value."""
 _KEY = "key"
 OWN_PARAMETERS = {
     "/seed": "each episode has its own seed, made from the experiment's key seed",
@@ -152,7 +152,7 @@ class Mode:
             if name not in node.entries:
                 text = f"mode {self.name} needs the key '{name}', in the file or in every level"
                 reading.faults.add(node.location, text)
-            value = key.read(node.entries[name], name, reading) if name in node.entries else None
+            value = key.read(reading, node.entries[name], name) if name in node.entries else None
             if value is None:
                 unreadable.add(name)
             else:
@@ -164,59 +164,26 @@ class Mode:
 
 def count(high: int = 1_000_000) -> ReadValue:
     """Returns a reader of whole numbers from 1."""
-    return lambda node, key, reading: reading.count(node, key, 1, high)
-
-
-def seconds(node: Node, key: str, reading: Reading) -> float | None:
-    """Reads a duration [s]; None after a fault.
-
-    Args:
-        node: Value in the file.
-        key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
-    """
-    return reading.number(node, f"{key} [s]", 0.001, 1e6)
-
-
-def text(node: Node, key: str, reading: Reading) -> str | None:
-    """Reads a text, which may be empty; None after a fault.
-
-    Args:
-        node: Value in the file.
-        key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
-    """
-    return "" if isinstance(node, Scalar) and node.value == "" else reading.text(node, key)
-
-
-def truth(node: Node, key: str, reading: Reading) -> bool | None:
-    """Reads a truth value; None after a fault.
-
-    Args:
-        node: Value in the file.
-        key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
-    """
-    return reading.truth(node, key)
+    return lambda reading, node, key: reading.count(node, key, 1, high)
 
 
 def named_values(example: str) -> ReadValue:
     """Returns a reader of values by name."""
 
-    def read(node: Node, key: str, reading: Reading) -> dict[str, Any] | None:
+    def read(reading: Reading, node: Node, key: str) -> dict[str, Any] | None:
         mapping = reading.mapping(node, key, example)
         return None if mapping is None else {name: json_value(value) for name, value in mapping.entries.items()}
 
     return read
 
 
-def ros_parameters(node: Node, key: str, reading: Reading) -> dict[str, Any] | None:
+def ros_parameters(reading: Reading, node: Node, key: str) -> dict[str, Any] | None:
     """Reads ROS parameters by full name; None if the value is no mapping.
 
     Args:
+        reading: Reader that collects faults and looks up references.
         node: Value in the file.
         key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
     """
     mapping = reading.mapping(node, key, "{/planner_name: RRTConnect}")
     if mapping is None:

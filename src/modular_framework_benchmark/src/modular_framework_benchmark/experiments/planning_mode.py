@@ -13,11 +13,10 @@ from modular_framework_benchmark.experiments.mode import (
     count,
     named_values,
     ros_parameters,
-    seconds,
     setting,
-    text,
 )
 from modular_framework_benchmark.experiments.problem_sets import NO_PROBLEM, Problem, read_problems
+from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.robot_setting import ModelSettings
 from modular_framework_benchmark.records.episode_settings import as_json
 
@@ -38,11 +37,11 @@ class PlanningSettings(ModelSettings):
     """
 
     problem: Problem = setting(read_problems, NO_PROBLEM, required=True, key="problems")
-    planner: str = setting(text, "")
+    planner: str = setting(Reading.optional_text, "")
     planner_parameters: Mapping[str, Any] = setting(named_values("{range: 0.5}"), {})
-    pipeline: str = setting(text, "ompl")
-    group: str = setting(text, "")
-    planning_time: float = setting(seconds, 5.0)
+    pipeline: str = setting(Reading.optional_text, "ompl")
+    group: str = setting(Reading.optional_text, "")
+    planning_time: float = setting(Reading.seconds, 5.0)
     attempts: int = setting(count(1000), 1)
     parameters: Mapping[str, Any] = setting(ros_parameters, {})
 

@@ -29,13 +29,13 @@ NO_PROBLEM = Problem("", "", "")
 """Problem of a combination, whose trials draw their problems."""
 
 
-def read_problems(node: Node, key: str, reading: Reading) -> list[Problem]:
+def read_problems(reading: Reading, node: Node, key: str) -> list[Problem]:
     """Returns the problems of one or several folders, sorted by name within a folder.
 
     Args:
+        reading: Reader that collects faults.
         node: Path of a folder, or a list of paths.
         key: Key of the value.
-        reading: Reader that collects faults.
     """
     problems: list[Problem] = []
     for item in node.items if isinstance(node, Sequence) else (node,):

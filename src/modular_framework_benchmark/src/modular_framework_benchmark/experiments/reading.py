@@ -46,6 +46,10 @@ class ValueReading:
         self.faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
         return None
 
+    def optional_text(self, node: Node, what: str) -> str | None:
+        """Returns a text, which may be empty."""
+        return "" if isinstance(node, Scalar) and node.value == "" else self.text(node, what)
+
     def name(self, node: Node, what: str) -> str | None:
         """Returns a text that is valid as a file name and as a database column."""
         name = self.text(node, what)
@@ -90,6 +94,10 @@ class ValueReading:
             return float(value)  # type: ignore[arg-type]
         self.faults.add(node.location, f"{what} must be {_range_text('a number', low, high)}, found {kind_of(node)}")
         return None
+
+    def seconds(self, node: Node, what: str) -> float | None:
+        """Returns a duration [s]."""
+        return self.number(node, f"{what} [s]", 0.001, 1e6)
 
     def count(self, node: Node, what: str, low: int = 1, high: int = MAX_SEED) -> int | None:
         """Returns an integer of a closed range.

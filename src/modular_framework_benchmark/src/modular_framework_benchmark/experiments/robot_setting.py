@@ -25,13 +25,13 @@ RobotSource = str | RobotFiles
 """Name of a MoveIt configuration package, or files."""
 
 
-def read_robot(node: Node, key: str, reading: Reading) -> RobotSource | None:
+def read_robot(reading: Reading, node: Node, key: str) -> RobotSource | None:
     """Reads the robot, whose package or files must exist; None after a fault.
 
     Args:
+        reading: Reader that collects faults and looks up references.
         node: Value in the file.
         key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
     """
     if isinstance(node, Mapping):
         return _read_files(node, key, reading)

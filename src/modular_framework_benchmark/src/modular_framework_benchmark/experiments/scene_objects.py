@@ -84,13 +84,13 @@ class ObjectNodes:
     surface: Distribution | None
 
 
-def read_objects(node: Node, key: str, reading: Reading) -> list[ObjectNodes] | None:
+def read_objects(reading: Reading, node: Node, key: str) -> list[ObjectNodes] | None:
     """Reads a list of objects, which may be empty; None if the value is no list.
 
     Args:
+        reading: Reader that collects faults and looks up references.
         node: Value in the file.
         key: Name of the key, for faults.
-        reading: Reader that collects faults and looks up references.
     """
     if not isinstance(node, ListNode):
         reading.faults.add(node.location, f"{key} must be a list such as [{EXAMPLE}], found {kind_of(node)}")

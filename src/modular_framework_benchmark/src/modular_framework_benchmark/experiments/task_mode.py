@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting, truth
+from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
@@ -29,7 +29,7 @@ FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
 """Arguments that name a file but determine neither the launched nodes nor the robot."""
 
 
-def _read_launch(node: Node, key: str, reading: Reading) -> str | None:
+def _read_launch(reading: Reading, node: Node, key: str) -> str | None:
     """Reads a launch file as PACKAGE/FILE or as a path."""
     name = reading.text(node, key)
     if name is None:
@@ -43,7 +43,7 @@ def _read_launch(node: Node, key: str, reading: Reading) -> str | None:
     return given
 
 
-def _read_task(node: Node, key: str, reading: Reading) -> str | None:
+def _read_task(reading: Reading, node: Node, key: str) -> str | None:
     """Reads a task by name or path."""
     name = reading.text(node, key)
     if name is None:
@@ -55,7 +55,7 @@ def _read_task(node: Node, key: str, reading: Reading) -> str | None:
     return None
 
 
-def _read_arguments(node: Node, key: str, reading: Reading) -> dict[str, str] | None:
+def _read_arguments(reading: Reading, node: Node, key: str) -> dict[str, str] | None:
     """Reads launch arguments as the text that roslaunch expects."""
     mapping = reading.mapping(node, key, "{world_file: ur5_table.world}")
     if mapping is None:
@@ -83,7 +83,7 @@ def _argument_text(value: Scalar) -> str:
     return str(value.value).lower() if isinstance(value.value, bool) else str(value.value)
 
 
-def _read_extra_parameters(node: Node, key: str, reading: Reading) -> tuple[str, ...] | None:
+def _read_extra_parameters(reading: Reading, node: Node, key: str) -> tuple[str, ...] | None:
     """Reads the names of parameters that the user's own nodes read."""
     items = reading.items(node, key, "[/my_node/my_parameter]")
     if items is None:
@@ -123,7 +123,7 @@ MAX_CRITERIA = {"lifted": 10.0, "hold_time": 3600.0}
 """Largest values in experiment files."""
 
 
-def _read_success(node: Node, key: str, reading: Reading) -> SuccessCriteria | None:
+def _read_success(reading: Reading, node: Node, key: str) -> SuccessCriteria | None:
     mapping = reading.mapping(node, key, "{lifted: 0.10, hold_time: 2.0}")
     known = (*MAX_CRITERIA, "object")
     found: dict[str, Any] = {}
@@ -157,7 +157,7 @@ class TaskSettings(EpisodeSettings):
     parameters: Map[str, Any] = setting(ros_parameters, {})
     extra_parameters: tuple[str, ...] = setting(_read_extra_parameters, ())
     objects: tuple[PlacedObject, ...] = setting(read_objects, ())
-    warm: bool = setting(truth, True)
+    warm: bool = setting(Reading.truth, True)
     task: str = setting(_read_task, "")
     success: SuccessCriteria = setting(_read_success, NO_CRITERIA)
 
