@@ -112,8 +112,8 @@ class SimulationNode:
             _pacer(parameters, requests),
             requests,
             actors,
-            self._on_paused_tick,
-            TimeHolds(rospy.logwarn),
+            on_paused_tick=self._on_paused_tick,
+            holds=TimeHolds(rospy.logwarn),
         )
         if parameters["~paused"]:
             self._loop.pause()
@@ -126,9 +126,9 @@ class SimulationNode:
             self._loop,
             self._scene,
             self._snapshot,
-            parameters["/wait_for_planning"],
-            digest,
-            self._services.refresh,
+            may_hold=parameters["/wait_for_planning"],
+            digest=digest,
+            after_restart=self._services.refresh,
         )
         self._sensors, self._cameras = self._build_sensors(parameters, actors)
         self._add_hooks(parameters["~pub_clock_frequency"])
@@ -153,12 +153,12 @@ class SimulationNode:
             self._settings,
             self._parts,
             spec.gravity,
-            parameters["~gui"],
-            rospy.logwarn,
-            engine,
-            parameters["~weld_grasps"],
+            gui=parameters["~gui"],
+            log=rospy.logwarn,
+            engine=engine,
         )
-        if parameters["~weld_grasps"]:
+        world.weld_grasps = parameters["~weld_grasps"]
+        if world.weld_grasps:
             rospy.logwarn("~weld_grasps is true: held objects are welded to the gripper and cannot slip")
         if parameters["~gui_required"] and not world.engine.has_window:
             raise SimulationError("~gui_required is true, but no window is available; set ~gui_required to false")

@@ -49,6 +49,7 @@ class TimeServices:
         loop: SimulationLoop,
         scene: PlanningScenePublisher,
         take_snapshot: Callable[[], WorldSnapshot],
+        *,
         may_hold: bool,
         digest: WorldDigest | None = None,
         after_restart: Callable[[], None] = lambda: None,

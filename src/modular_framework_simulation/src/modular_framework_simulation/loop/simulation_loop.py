@@ -89,6 +89,7 @@ class SimulationLoop:
         pacer: Pacer,
         requests: RequestQueue,
         actors: Actors | None,
+        *,
         on_paused_tick: Callable[[], None] = lambda: None,
         holds: TimeHolds | None = None,
     ) -> None:

@@ -174,7 +174,7 @@ class SdfModels:
         joints = [read_joint(joint, frames, version) for joint in node.find_all("joint")]
         sensors = list(sdf_sensor_elements(node, frames))
         for name, each in inner.items():
-            _add_inner(name, each.spec, frames.pose_in_model(name), links, joints, fix_to_world=not static)
+            _add_inner(name, each.spec, frames.pose_in_model(name), links=links, joints=joints, fix_to_world=not static)
             reading.notes.add_lines(each.spec.notes)
             sensors += [_scoped_sensor(sensor, name) for sensor in each.spec.sensors]
         if not links:
@@ -250,7 +250,7 @@ def _read_link(node: XmlNode, frames: FrameTree, static: bool, reading: Reading)
 
 
 def _add_inner(
-    name: str, inner: specs.Model, pose: Pose, links: list[specs.Link], joints: list[specs.Joint], fix_to_world: bool
+    name: str, inner: specs.Model, pose: Pose, *, links: list[specs.Link], joints: list[specs.Joint], fix_to_world: bool
 ) -> None:
     """Adds the links and joints of an inner model to the links and joints of the outer model."""
 

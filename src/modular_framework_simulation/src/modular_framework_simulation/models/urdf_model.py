@@ -71,7 +71,9 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
         if child.tag not in _SUPPORTED_TAGS:
             notes.add(child, "has no effect", child.tag)
     colours = _named_colours(root)
-    links = tuple(_read_link(node, parents, extensions, resources, colours, notes) for node in nodes)
+    links = tuple(
+        _read_link(node, parents, extensions, resources=resources, colours=colours, notes=notes) for node in nodes
+    )
     known = [link.name for link in links] + [specs.WORLD]
     joints = tuple(_read_joint(joint, known, extensions, notes) for joint in joint_nodes)
     _refuse_two_parents(joint_nodes)
@@ -163,6 +165,7 @@ def _read_link(
     node: XmlNode,
     parents: dict[str, XmlNode],
     extensions: UrdfExtensions,
+    *,
     resources: Resources,
     colours: dict[str, specs.Colour],
     notes: Notes,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -93,8 +93,8 @@ class Link:
     pose: Pose
     mass: MassProperties
     shapes: tuple[Shape, ...]
-    joint: EngineJoint | None
-    axis: Vector3
+    joint: EngineJoint | None = None
+    axis: Vector3 = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,16 +128,18 @@ def read_tree(text: str, name: str, fixed: bool, log: Log) -> BodyTree:
     roots = [link for link in elements if link not in children]
     if len(roots) != 1:
         raise DescriptionError(f"model '{name}'", f"has {len(roots)} root links: {roots}", "expected one root link")
-    links = [_link(elements[roots[0]], name, None, Pose(), None, (0.0, 0.0, 1.0), log)]
+    mass, shapes = _matter(elements[roots[0]], name, log)
     if fixed:
-        links[0] = replace(links[0], mass=links[0].mass._replace(mass=0.0))
+        mass = mass._replace(mass=0.0)
+    links = [Link(roots[0], parent=None, pose=Pose(), mass=mass, shapes=shapes)]
     pending = [(joint, BASE_INDEX) for joint in reversed(child_joints.get(roots[0], []))]
     while pending:
         element, parent = pending.pop()
         child, index = element.find("child").get("link"), len(links) - 1
         x, y, z = _numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0))
         joint = _joint(element, index, name)
-        links.append(_link(elements[child], name, parent, _origin(element), joint, (x, y, z), log))
+        mass, shapes = _matter(elements[child], name, log)
+        links.append(Link(child, parent, _origin(element), mass, shapes, joint=joint, axis=(x, y, z)))
         pending += [(each, index) for each in reversed(child_joints.get(child, []))]
     return BodyTree(name, fixed, tuple(links))
 
@@ -161,19 +163,11 @@ def _joint(element: Element, index: int, model: str) -> EngineJoint:
     return EngineJoint(index, name, child, kind, lower, upper, damping, friction)
 
 
-def _link(
-    element: Element,
-    model: str,
-    parent: int | None,
-    pose: Pose,
-    joint: EngineJoint | None,
-    axis: Vector3,
-    log: Log,
-) -> Link:
+def _matter(element: Element, model: str, log: Log) -> tuple[MassProperties, tuple[Shape, ...]]:
+    """Returns the mass and the shapes of a <link>."""
     name = element.get("name", "")
     shapes = tuple(_shape(collision, model, name) for collision in element.findall("collision"))
-    mass = _mass(element.find("inertial"), f"model '{model}', link '{name}'", log)
-    return Link(name, parent, pose, mass, shapes, joint, axis)
+    return _mass(element.find("inertial"), f"model '{model}', link '{name}'", log), shapes
 
 
 def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
@@ -270,7 +264,14 @@ class SpecWriter:
         for position, link in enumerate(tree.links):
             parent_body = self._spec.worldbody if link.parent is None else bodies[link.parent + 1]
             bodies.append(
-                self._add_link(parent_body, link, body_name(number, position - 1), number, tree, centre_in_world)
+                self._add_link(
+                    parent_body,
+                    link,
+                    body_name(number, position - 1),
+                    number=number,
+                    tree=tree,
+                    centre_in_world=centre_in_world,
+                )
             )
         link_indices = [position - 1 for position, link in enumerate(tree.links) if link.shapes]
         for first, a in enumerate(link_indices):
@@ -301,6 +302,7 @@ class SpecWriter:
         parent_body: mujoco.MjsBody,
         link: Link,
         name: str,
+        *,
         number: int,
         tree: BodyTree,
         centre_in_world: Pose,

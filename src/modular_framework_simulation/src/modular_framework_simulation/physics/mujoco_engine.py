@@ -381,6 +381,7 @@ class MujocoEngine(PhysicsEngine):
         number: int,
         indices: Sequence[int],
         targets: Sequence[float],
+        *,
         velocities: Sequence[float],
         efforts: Sequence[float],
         gain: float,
@@ -393,7 +394,7 @@ class MujocoEngine(PhysicsEngine):
 
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
         """Sets a motor that moves a joint at a velocity."""
-        self.set_position_motors(number, [index], [0.0], [velocity], [effort], 0.0)
+        self.set_position_motors(number, [index], [0.0], velocities=[velocity], efforts=[effort], gain=0.0)
 
     def apply_effort(self, number: int, index: int, effort: float) -> None:
         """Applies an effort to a joint in the next step."""

@@ -405,6 +405,7 @@ class PhysicsEngine(ABC):
         number: int,
         indices: Sequence[int],
         targets: Sequence[float],
+        *,
         velocities: Sequence[float],
         efforts: Sequence[float],
         gain: float,

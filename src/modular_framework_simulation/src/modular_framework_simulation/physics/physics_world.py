@@ -102,7 +102,6 @@ class PhysicsWorld:
         gui: Whether to open a window if a display is available.
         log: Function that logs a decision.
         engine: Name of the physics engine, see `engine_choice`.
-        weld_grasps: Whether held objects are welded to the gripper; otherwise only friction holds them.
 
     Raises:
         SimulationError: The engine is unknown or not available.
@@ -113,10 +112,10 @@ class PhysicsWorld:
         settings: PhysicsSettings,
         convex_parts: ConvexParts,
         gravity: Vector3 = (0.0, 0.0, -9.8),
+        *,
         gui: bool = False,
         log: Log = print,
         engine: str = PYBULLET,
-        weld_grasps: bool = False,
     ) -> None:
         self.settings = settings
         self.gravity = gravity
@@ -134,7 +133,8 @@ class PhysicsWorld:
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
         self._forces: dict[int, tuple[BodyForce, ...]] = {}
-        self.weld_grasps = weld_grasps
+        self.weld_grasps = False
+        """Whether held objects are welded to the gripper; otherwise only friction holds them."""
         self._carried: dict[tuple[str, str], CarriedObject] = {}
         self._welds: dict[tuple[str, str], int] = {}
         self._steps = self._time_ns = self._last_computed_step = 0
@@ -288,7 +288,7 @@ class PhysicsWorld:
         parts = []
         for tree in (urdf, *urdf.further):
             number = self.engine.load_urdf(tree.text, model.name, tree.fixed)
-            parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
+            parts.append(SimulatedBody(self.engine, number, model.name, tree=tree, static=model.static, spec=model))
             parts[-1].release_ball_joints()
             self._set_properties(parts[-1], model)
         body = parts[0]

@@ -496,6 +496,7 @@ class PyBulletEngine(PhysicsEngine):
         number: int,
         indices: Sequence[int],
         targets: Sequence[float],
+        *,
         velocities: Sequence[float],
         efforts: Sequence[float],
         gain: float,

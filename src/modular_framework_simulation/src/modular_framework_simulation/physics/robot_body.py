@@ -145,7 +145,7 @@ class RobotBody:
     def _load(self) -> None:
         engine = self.world.engine
         number = engine.load_urdf(self.description.engine_urdf, self._name, True, self_collision=True)
-        self.body = SimulatedBody(engine, number, self._name, None, True, None)
+        self.body = SimulatedBody(engine, number, self._name, tree=None, static=True, spec=None)
         self._dynamics = {
             joint.name: JointDynamics(damping=joint.damping, friction=joint.friction) for joint in engine.joints(number)
         }
@@ -286,7 +286,9 @@ class RobotBody:
             velocities.append(velocity)
             efforts.append(effort)
         engine = self.world.engine
-        engine.set_position_motors(self.body.number, self._indices, targets, velocities, efforts, _POSITION_GAIN)
+        engine.set_position_motors(
+            self.body.number, self._indices, targets, velocities=velocities, efforts=efforts, gain=_POSITION_GAIN
+        )
         self._apply_efforts(drives)
 
     def _apply_efforts(self, drives: dict[str, Drive]) -> None:

@@ -74,6 +74,7 @@ class SimulatedBody:
         engine: PhysicsEngine,
         number: int,
         name: str,
+        *,
         tree: BodyUrdf | None,
         static: bool,
         spec: Model | None,
