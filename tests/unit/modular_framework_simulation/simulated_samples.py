@@ -72,10 +72,10 @@ def jointed(
         specs.JointType.CONTINUOUS,
         specs.WORLD,
         "bob",
-        Pose((-length, 0, 0)),
-        (0, 1, 0),
-        -math.inf,
-        math.inf,
+        pose=Pose((-length, 0, 0)),
+        axis=(0, 1, 0),
+        lower=-math.inf,
+        upper=math.inf,
         dynamics=dynamics,
     )
     return specs.Model(name, pose, False, (bob,), (hinge,), "test")

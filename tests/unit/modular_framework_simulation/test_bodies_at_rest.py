@@ -80,7 +80,7 @@ def test_contact_forces_of_a_body_at_rest_are_its_weight(table: PhysicsWorld) ->
 def test_the_load_on_a_joint_of_a_body_that_lies_still_is_measured(world: PhysicsWorld, fastened: bool) -> None:
     crate = solid("crate", CUBE, Pose((0, 0, 0.025)))
     lid = replace(crate.links[0], name="lid", pose=Pose((0, 0, 0.05)))
-    bolt = specs.Joint("bolt", specs.JointType.FIXED, "link", "lid", Pose(), (0, 0, 1), 0.0, 0.0)
+    bolt = specs.Joint("bolt", specs.JointType.FIXED, "link", "lid", pose=Pose(), axis=(0, 0, 1), lower=0.0, upper=0.0)
     anchor = replace(bolt, name="anchor", parent=specs.WORLD, child="link")
     world.spawn(replace(crate, links=(*crate.links, lid), joints=(bolt, anchor) if fastened else (bolt,)))
     (tree,) = world.body("crate").parts

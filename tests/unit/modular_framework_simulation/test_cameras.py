@@ -42,7 +42,15 @@ def visible(name: str, geometry: specs.Geometry, pose: Pose, colour: tuple[float
 
 def camera(pose: Pose, parent: str = "world", pinhole: Pinhole | None = None) -> Camera:
     """A camera at a pose of its optical frame."""
-    return Camera("camera", "optical", parent, pose, 10.0, CameraTopics(), pinhole or Pinhole(far=5.0))
+    return Camera(
+        name="camera",
+        frame_id="optical",
+        parent=parent,
+        optical_in_parent=pose,
+        rate_hz=10.0,
+        topics=CameraTopics(),
+        pinhole=pinhole or Pinhole(far=5.0),
+    )
 
 
 @pytest.fixture(params=list(Drawing), ids=lambda drawing: drawing.name)

@@ -339,7 +339,9 @@ def set_joint_velocity(world: PhysicsWorld, model: str, joint: str, velocity: fl
 def test_a_model_with_a_ball_joint_has_damped_joints_and_springs_too(world: PhysicsWorld) -> None:
     model = jointed("lamp", 0.4, specs.JointDynamics(0.01, 0.0, 0.3, 0.5), Pose((0, 0, 2)))
     bob = replace(model.links[0], name="shade", pose=Pose((0.6, 0, 0)))
-    ball = specs.Joint("ball", specs.JointType.BALL, "bob", "shade", Pose((-0.2, 0, 0)), (0, 0, 1), 0.0, 0.0)
+    ball = specs.Joint(
+        "ball", specs.JointType.BALL, "bob", "shade", pose=Pose((-0.2, 0, 0)), axis=(0, 0, 1), lower=0.0, upper=0.0
+    )
     world.spawn(replace(model, links=(*model.links, bob), joints=(*model.joints, ball)))
     run(world, 2.0)
     assert math.isfinite(joint_state(world, "lamp", "hinge")[0])

@@ -37,7 +37,7 @@ MAX_MIMIC_LIMIT = 1e6
 """Magnitude of a mimic joint's limits if the leading joint has no limits [rad or m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotDescription:
     """Robot description for the simulation.
 
@@ -96,7 +96,15 @@ def read_robot(
     followers = {joint.name for joint in robot.joints if joint.mimic is not None}
     initial = {joint.name: joint.initial_position for joint in simulated if joint.name not in followers}
     text = xml_text.to_text(root)
-    return RobotDescription(root.get("name", "robot"), joints, links, parents, text, initial, _frictions(root))
+    return RobotDescription(
+        name=root.get("name", "robot"),
+        joints=joints,
+        links=links,
+        parents=parents,
+        engine_urdf=text,
+        initial_positions=initial,
+        frictions=_frictions(root),
+    )
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:

@@ -61,20 +61,22 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
         kind,
         parent,
         child,
-        pose,
-        axis,
-        lower,
-        upper,
-        drive_bound(axis_node, "effort"),
-        drive_bound(axis_node, "velocity"),
-        read_joint_dynamics(axis_node),
-        node.where,
+        pose=pose,
+        axis=axis,
+        lower=lower,
+        upper=upper,
+        effort=drive_bound(axis_node, "effort"),
+        velocity=drive_bound(axis_node, "velocity"),
+        dynamics=read_joint_dynamics(axis_node),
+        where=node.where,
     )
 
 
 def _without_axis(node: XmlNode, kind: specs.JointType, parent: str, child: str, pose: Pose) -> specs.Joint:
     along_z = (0.0, 0.0, 1.0)
-    return specs.Joint(node.name(), kind, parent, child, pose, along_z, -math.inf, math.inf, where=node.where)
+    return specs.Joint(
+        node.name(), kind, parent, child, pose=pose, axis=along_z, lower=-math.inf, upper=math.inf, where=node.where
+    )
 
 
 def _axis_in_joint(node: XmlNode, joint_in_model: Pose, frames: FrameTree, version: Version) -> Vector3:

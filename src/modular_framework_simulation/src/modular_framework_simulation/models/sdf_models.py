@@ -266,10 +266,10 @@ def _add_inner(
                     specs.JointType.FIXED,
                     specs.WORLD,
                     scoped(link.name),
-                    Pose(),
-                    (0.0, 0.0, 1.0),
-                    0.0,
-                    0.0,
+                    pose=Pose(),
+                    axis=(0.0, 0.0, 1.0),
+                    lower=0.0,
+                    upper=0.0,
                 )
             )
     for joint in inner.joints if not inner.static else ():

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from enum import Enum
 from pathlib import Path
 
@@ -199,6 +199,7 @@ class Link:
     inertial: Inertial | None
     collisions: tuple[Collision, ...]
     visuals: tuple[Visual, ...]
+    _: KW_ONLY
     velocity_decay: VelocityDecay = VelocityDecay()
     gravity: bool = True
     kinematic: bool = False
@@ -245,6 +246,7 @@ class Joint:
     kind: JointType
     parent: str
     child: str
+    _: KW_ONLY
     pose: Pose
     axis: Vector3
     lower: float
@@ -299,6 +301,7 @@ class Model:
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     source: str
+    _: KW_ONLY
     self_collide: bool = False
     notes: tuple[str, ...] = ()
     sensors: tuple[SensorElement, ...] = ()

@@ -84,7 +84,17 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     static = fixed_to_world or extensions.flag("", "static") is True
     self_collide = extensions.flag("", "self_collide", "selfCollide") is True
     sensors = urdf_sensor_elements(root)
-    return specs.Model(root.name(), Pose(), static, links, joints, source, self_collide, notes.lines, sensors)
+    return specs.Model(
+        root.name(),
+        Pose(),
+        static,
+        links,
+        joints,
+        source,
+        self_collide=self_collide,
+        notes=notes.lines,
+        sensors=sensors,
+    )
 
 
 def collision_name(given: str, link: str, index: int) -> str:
@@ -199,10 +209,10 @@ def _read_link(
         _inertial(inertial, collisions, notes) if inertial is not None else _FRAME_INERTIAL,
         collisions,
         tuple(visuals),
-        extensions.velocity_decay(name),
-        extensions.gravity(name),
-        extensions.flag(name, "kinematic") is True,
-        extensions.flag(name, "selfCollide"),
+        velocity_decay=extensions.velocity_decay(name),
+        gravity=extensions.gravity(name),
+        kinematic=extensions.flag(name, "kinematic") is True,
+        self_collide=extensions.flag(name, "selfCollide"),
     )
 
 
@@ -276,24 +286,27 @@ def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, not
     if (mimic := node.find("mimic")) is not None:
         notes.add(mimic, "has no effect, as in Gazebo; the joint moves independently")
     limit, dynamics = node.find("limit"), node.find("dynamics")
-    bounds = (-math.inf, math.inf)
+    lower, upper = -math.inf, math.inf
     if limit is not None and kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
-        bounds = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
-        if bounds[0] > bounds[1]:
-            problem = f"got lower {bounds[0]:g} and upper {bounds[1]:g}"
+        lower, upper = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0)
+        if lower > upper:
+            problem = f"got lower {lower:g} and upper {upper:g}"
             raise DescriptionError(limit.where, problem, "allowed: a lower limit below the upper limit")
     return specs.Joint(
         node.name(),
         kind,
         _role(node, "parent"),
         _role(node, "child"),
-        Pose(),
-        _axis(node),
-        *bounds,
-        _number(limit, "effort", math.inf),
-        _number(limit, "velocity", math.inf),
-        extensions.dynamics(node.name(), _number(dynamics, "damping", 0.0), _number(dynamics, "friction", 0.0)),
-        node.where,
+        pose=Pose(),
+        axis=_axis(node),
+        lower=lower,
+        upper=upper,
+        effort=_number(limit, "effort", math.inf),
+        velocity=_number(limit, "velocity", math.inf),
+        dynamics=extensions.dynamics(
+            node.name(), _number(dynamics, "damping", 0.0), _number(dynamics, "friction", 0.0)
+        ),
+        where=node.where,
     )
 
 

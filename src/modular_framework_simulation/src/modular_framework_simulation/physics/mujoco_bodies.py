@@ -160,7 +160,16 @@ def _joint(element: Element, index: int, model: str) -> EngineJoint:
             lower, upper = -math.inf, math.inf
     damping, friction = (0.0 if dynamics is None else float(dynamics.get(key, "0")) for key in ("damping", "friction"))
     child = element.find("child").get("link")
-    return EngineJoint(index, name, child, kind, lower, upper, damping, friction)
+    return EngineJoint(
+        index=index,
+        name=name,
+        child_link=child,
+        kind=kind,
+        lower=lower,
+        upper=upper,
+        damping=damping,
+        friction=friction,
+    )
 
 
 def _matter(element: Element, model: str, log: Log) -> tuple[MassProperties, tuple[Shape, ...]]:

@@ -50,7 +50,7 @@ class JointKind(Enum):
     OTHER = "other"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EngineJoint:
     """Joint in the engine.
 

@@ -310,7 +310,16 @@ class PyBulletEngine(PhysicsEngine):
         if lower > upper:  # the engine's encoding of no limits
             lower, upper = -math.inf, math.inf
         kind = kinds.get(info[2], JointKind.OTHER)
-        return EngineJoint(info[0], info[1].decode(), info[12].decode(), kind, lower, upper, info[6], info[7])
+        return EngineJoint(
+            index=info[0],
+            name=info[1].decode(),
+            child_link=info[12].decode(),
+            kind=kind,
+            lower=lower,
+            upper=upper,
+            damping=info[6],
+            friction=info[7],
+        )
 
     def mass_properties(self, number: int, index: int) -> MassProperties:
         """Returns the mass properties of a link."""

@@ -77,7 +77,16 @@ def _camera(name: str, section: Mapping[str, Any], topics: CameraTopics, locate:
     pinhole = Pinhole(int(values.pop("width", 640)), int(values.pop("height", 480)), **values)
     try:
         frame = _text(section, "frame_id")
-        return Camera(name, frame, parent, pose, rate, topics, pinhole, noise=Noise(stddev=stddev))
+        return Camera(
+            name=name,
+            frame_id=frame,
+            parent=parent,
+            optical_in_parent=pose,
+            rate_hz=rate,
+            topics=topics,
+            pinhole=pinhole,
+            noise=Noise(stddev=stddev),
+        )
     except ValueError as error:
         raise _Fault(f"camera/{error}") from error
 

@@ -54,7 +54,18 @@ def read_camera(xml: SensorXml, seed: int) -> Camera:
     parent = f"{xml.model.name}::{xml.link}"
     in_parent = body_in_parent @ OPTICAL_IN_BODY
     noise = sensor.noise("camera/noise")
-    return Camera(xml.name, frame, parent, in_parent, rate, topics, pinhole, depth_range, noise, seed)
+    return Camera(
+        name=xml.name,
+        frame_id=frame,
+        parent=parent,
+        optical_in_parent=in_parent,
+        rate_hz=rate,
+        topics=topics,
+        pinhole=pinhole,
+        depth_range=depth_range,
+        noise=noise,
+        seed=seed,
+    )
 
 
 def _topics_below(base: str, with_depth: bool) -> CameraTopics:

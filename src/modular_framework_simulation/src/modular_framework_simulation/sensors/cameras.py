@@ -123,7 +123,7 @@ class CameraTopics:
     points: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
     """Simulated camera.
 

@@ -23,7 +23,7 @@ _MERGED_NAME = re.compile(r".*_fixed_joint_lump__(.+)")
 _NUMBERED_NAME = re.compile(r"(.+)_\d+")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ContactSensor(Sensor):
     """Contact sensor.
 
@@ -81,7 +81,17 @@ def read_contact(xml: SensorXml) -> ContactSensor:
         allowed = f"world, or a link of the model: {', '.join(xml.model.links)}"
         raise ValueError(f"<frameName>: got '{frame}'; allowed: {allowed}")
     link, collisions = _shapes(xml)
-    return ContactSensor(xml.name, xml.model.name, link, xml.pose, topic, frame, rate, collisions, reference_link)
+    return ContactSensor(
+        name=xml.name,
+        model=xml.model.name,
+        link=link,
+        pose=xml.pose,
+        topic=topic,
+        frame_id=frame,
+        rate_hz=rate,
+        collisions=collisions,
+        reference_link=reference_link,
+    )
 
 
 def _shapes(xml: SensorXml) -> tuple[str, tuple[str, ...]]:

@@ -27,7 +27,7 @@ Noises = tuple[Noise, Noise, Noise]
 _NO_NOISES: Noises = (NO_NOISE, NO_NOISE, NO_NOISE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ImuSensor(Sensor):
     """Inertial measurement unit.
 
@@ -68,7 +68,13 @@ def read_imu(xml: SensorXml) -> ImuSensor:
         ValueError: A value is unsupported or invalid.
     """
     noiseless = ImuSensor(
-        xml.name, xml.model.name, xml.link, xml.pose, "", "", xml.sensor.number("update_rate", 0.0, 0.0)
+        name=xml.name,
+        model=xml.model.name,
+        link=xml.link,
+        pose=xml.pose,
+        topic="",
+        frame_id="",
+        rate_hz=xml.sensor.number("update_rate", 0.0, 0.0),
     )
     rates, forces = (_noises(xml, kind) for kind in ("angular_velocity", "linear_acceleration"))
     sensor = replace(noiseless, rate_noise=rates, acceleration_noise=forces)

@@ -143,7 +143,9 @@ def _xml(parts: ModelParts, element: SensorElement) -> SensorXml | None:
         file = _file(element.node)
         if file in _REPLACED_PLUGINS:
             return None
-        return SensorXml(parts, element.scope, reader, reader, file, "", "", Pose())
+        return SensorXml(
+            model=parts, scope=element.scope, sensor=reader, plugin=reader, file=file, link="", joint="", pose=Pose()
+        )
     for key in ("always_on", "update_rate", "topic"):
         reader.find(key)
     reader.skip("plugin")
@@ -157,7 +159,16 @@ def _xml(parts: ModelParts, element: SensorElement) -> SensorXml | None:
         plugin_reader.find("alwaysOn")
     file = _file(plugin) if plugin is not None else ""
     pose = element.pose if element.pose is not None else reader.pose("pose")
-    return SensorXml(parts, element.scope, reader, plugin_reader, file, element.link, element.joint, pose)
+    return SensorXml(
+        model=parts,
+        scope=element.scope,
+        sensor=reader,
+        plugin=plugin_reader,
+        file=file,
+        link=element.link,
+        joint=element.joint,
+        pose=pose,
+    )
 
 
 def _file(plugin: XmlNode) -> str:

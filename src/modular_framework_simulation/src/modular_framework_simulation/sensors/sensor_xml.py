@@ -81,7 +81,7 @@ class ModelParts:
     namespace: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SensorXml:
     """Sensor element of a description.
 
