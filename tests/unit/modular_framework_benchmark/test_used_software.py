@@ -92,7 +92,9 @@ def test_a_plan_without_simulation_by_another_planner_is_invalid(tmp_path: Path)
     ran = UsedSoftware().with_plans([run])
     report = ComponentReport("planning", "boxes", True, "", 0.0, 1.0, wall_s=1.0, ran=ran)
     spec = EpisodeSpec(0, {}, 0, 1, TaskSettings(metrics=("success", "planning_time")))
-    record = measured_record(spec, EpisodeStatus.SUCCEEDED, "SUCCESS", report, tmp_path, Stopwatch())
+    record = measured_record(
+        spec, EpisodeStatus.SUCCEEDED, "SUCCESS", report=report, folder=tmp_path, watch=Stopwatch()
+    )
     assert (record.status, record.cause) == (EpisodeStatus.INVALID, REPLACED)
     assert record.metrics == {"success": None, "planning_time": None}
 

@@ -97,7 +97,7 @@ def read_experiment(
     if not isinstance(root, Mapping):
         raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
     reading = Reading(faults, path.resolve().parent, resources)
-    experiment = _Reader(root, text, path, reading, known_metrics, checks or {}).read()
+    experiment = _Reader(root, text, path, reading=reading, known_metrics=known_metrics, checks=checks or {}).read()
     if experiment is None:
         raise ExperimentFault(faults.sorted())
     return experiment
@@ -111,6 +111,7 @@ class _Reader:
         root: Mapping,
         text: str,
         path: Path,
+        *,
         reading: Reading,
         known_metrics: KnownMetrics,
         checks: SettingChecks,

@@ -46,6 +46,7 @@ def _registered(
     measure: MetricFunction,
     kind: MetricKind,
     better: Direction,
+    *,
     unit: str = "",
     bounds: _Bounds = (None, None),
     source: Source = Source.MEASURED,
@@ -80,7 +81,7 @@ def _timed(
         clock: Clock of the duration.
         source: Origin of the values.
     """
-    found = _registered(measure, MetricKind.TIME, better, "s", source=source)
+    found = _registered(measure, MetricKind.TIME, better, unit="s", source=source)
     return replace(found, metric=replace(found.metric, clock=clock))
 
 
@@ -100,25 +101,25 @@ _ALL = (
     _registered(planning.concurrent_plans, _COUNT, _LOWER),
     _timed(planning.search_time, _LOWER, _WALL),
     _registered(planning.planning_success, _VALUE, _HIGHER, bounds=_FRACTION),
-    _registered(planning.path_length, _VALUE, _LOWER, "rad", _NONNEGATIVE),
+    _registered(planning.path_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
     _timed(planning.motion_duration, _LOWER, _SIMULATED),
     _registered(planning.smoothness, _VALUE, _HIGHER),
-    _registered(planning.clearance, _VALUE, _HIGHER, "m"),
+    _registered(planning.clearance, _VALUE, _HIGHER, unit="m"),
     _registered(planning.attempts, _COUNT, _LOWER),
     _registered(kinematics.solved_share, _VALUE, _HIGHER, bounds=_FRACTION),
     _timed(kinematics.solving_time, _LOWER, _WALL),
     _registered(kinematics.solutions, _COUNT, _HIGHER),
-    _registered(kinematics.position_error, _VALUE, _LOWER, "m", _NONNEGATIVE),
-    _registered(kinematics.rotation_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
+    _registered(kinematics.position_error, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
+    _registered(kinematics.rotation_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
     _timed(execution.execution_time, _LOWER, _SIMULATED),
     _registered(execution.execution_success, _VALUE, _HIGHER, bounds=_FRACTION),
-    _registered(execution.tracking_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
-    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
-    _registered(execution.executed_length, _VALUE, _LOWER, "rad", _NONNEGATIVE),
+    _registered(execution.tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _registered(execution.executed_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
     _registered(execution.executed_smoothness, _VALUE, _HIGHER),
-    _registered(execution.greatest_effort, _VALUE, _LOWER, "Nm", _NONNEGATIVE),
-    _registered(grasp.lift, _VALUE, _HIGHER, "m"),
-    _registered(grasp.slip, _VALUE, _LOWER, "m", _NONNEGATIVE),
+    _registered(execution.greatest_effort, _VALUE, _LOWER, unit="Nm", bounds=_NONNEGATIVE),
+    _registered(grasp.lift, _VALUE, _HIGHER, unit="m"),
+    _registered(grasp.slip, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
     _timed(grasp.grasp_time, _LOWER, _SIMULATED),
     _timed(grasp.hold_time, _HIGHER, _SIMULATED),
 )

@@ -44,7 +44,7 @@ def broken_record(spec: EpisodeSpec, cause: str, watch: Stopwatch) -> EpisodeRec
 
 
 def measured_record(
-    spec: EpisodeSpec, status: EpisodeStatus, outcome: str, report: ComponentReport, folder: Path, watch: Stopwatch
+    spec: EpisodeSpec, status: EpisodeStatus, outcome: str, *, report: ComponentReport, folder: Path, watch: Stopwatch
 ) -> EpisodeRecord:
     """Returns the record of an episode with its measured metrics.
 

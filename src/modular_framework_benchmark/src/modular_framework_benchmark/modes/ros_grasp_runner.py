@@ -86,7 +86,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _Prepared]):
             ran=_ran(settings.method_package, prepared),
         )
         status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
-        return measured_record(spec, status, outcome, report, folder, watch)
+        return measured_record(spec, status, outcome, report=report, folder=folder, watch=watch)
 
     def prepared_by(self, settings: GraspSettings) -> tuple[Any, ...]:
         """Returns robot, group and gripper joint."""

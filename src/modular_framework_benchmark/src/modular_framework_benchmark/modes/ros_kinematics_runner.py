@@ -91,7 +91,9 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
             ),
         )
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
-        return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
+        return measured_record(
+            spec, status, "unsolved" if unsolved else "solved", report=report, folder=folder, watch=watch
+        )
 
     def prepared_by(self, settings: KinematicsSettings) -> tuple[Any, ...]:
         """Returns the settings of the solver."""

@@ -89,7 +89,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
             motion=_motion(response.trajectory) if response is not None else None,
             ran=_ran(statistics, prepared.model),
         )
-        return measured_record(spec, _status(code), code.name, report, folder, watch)
+        return measured_record(spec, _status(code), code.name, report=report, folder=folder, watch=watch)
 
     def prepared_by(self, settings: PlanningSettings) -> tuple[Any, ...]:
         """Returns the settings of the pipeline."""

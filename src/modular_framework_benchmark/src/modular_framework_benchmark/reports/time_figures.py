@@ -84,10 +84,17 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
     shown: set[str] = set()
     for row, item in enumerate(episodes):
         for span in _leaves(of_episode[item.number]).to_dict("records"):
-            _add_span(figure, span, row - 0.12, 0.44, colors[span["name"]], str(span["name"]) not in shown)
+            _add_span(
+                figure,
+                span,
+                y=row - 0.12,
+                width=0.44,
+                color=colors[span["name"]],
+                in_legend=str(span["name"]) not in shown,
+            )
             shown.add(str(span["name"]))
         for span in _components(of_episode[item.number]).to_dict("records"):
-            _add_span(figure, span, row + 0.24, 0.14, "#5f6c7b", False)
+            _add_span(figure, span, y=row + 0.24, width=0.14, color="#5f6c7b", in_legend=False)
     styled(figure, height=150 + 52 * len(episodes))
     figure.update_layout(barmode="overlay")
     labels = [
@@ -122,7 +129,9 @@ def _components(spans: pd.DataFrame) -> pd.DataFrame:
     return spans[spans["kind"] == "component"]
 
 
-def _add_span(figure: go.Figure, span: dict[str, object], y: float, width: float, color: str, in_legend: bool) -> None:
+def _add_span(
+    figure: go.Figure, span: dict[str, object], *, y: float, width: float, color: str, in_legend: bool
+) -> None:
     started = float(str(span["started_s"]))
     ended = span["ended_s"]
     unended = ended is None or not np.isfinite(float(str(ended)))

@@ -97,7 +97,7 @@ class DaskPool:
             raise
         except Exception as error:  # a lost worker, or an error of the task
             cause = f"its Dask task failed: {type(error).__name__}: {error}"
-            return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun, time.time() - begun)
+            return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun=begun, wall_s=time.time() - begun)
 
     def close(self) -> None:
         """Ends the workers' processes and disconnects from the scheduler."""

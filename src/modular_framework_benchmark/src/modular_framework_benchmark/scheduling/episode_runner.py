@@ -33,7 +33,7 @@ RunnerFactory = Callable[[], EpisodeRunner]
 
 
 def unrun_record(
-    spec: EpisodeSpec, status: EpisodeStatus, cause: str, begun: float, wall_s: float, worker: str = ""
+    spec: EpisodeSpec, status: EpisodeStatus, cause: str, *, begun: float, wall_s: float, worker: str = ""
 ) -> EpisodeRecord:
     """Returns the record of an episode without a record from its runner.
 

@@ -141,7 +141,7 @@ class LocalPool:
 
     def _unrun(self, running: Running, worker: WorkerProcess, status: EpisodeStatus, cause: str) -> EpisodeRecord:
         wall_s = time.monotonic() - running.started
-        return unrun_record(running.spec, status, cause, running.begun, wall_s, worker.name)
+        return unrun_record(running.spec, status, cause, begun=running.begun, wall_s=wall_s, worker=worker.name)
 
     def _end(self, worker: WorkerProcess) -> None:
         worker.kill()

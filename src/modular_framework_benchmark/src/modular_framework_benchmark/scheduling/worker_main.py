@@ -85,7 +85,7 @@ def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple
         with contextlib.suppress(Exception):
             runner.close()
         cause = f"the runner raised {type(error).__name__}: {error}"
-        return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun, time.monotonic() - start), False
+        return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun=begun, wall_s=time.monotonic() - start), False
 
 
 def _end_with_parent(lifeline: int) -> None:
