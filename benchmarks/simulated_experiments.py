@@ -94,7 +94,8 @@ def results(world: World, drawn: Draw, **description: object) -> ExperimentResul
     levels = tuple(str(each) for each in range(int(level.max()) + 1))
     factors = (Factor("method", names), Factor("object", levels))
     described = ExperimentDescription(
-        "simulated", world.mode, "", "", factors, "method", world.metrics, LIMIT_S, **description  # type: ignore[arg-type]
+        "simulated", world.mode, text="", digest="", factors=factors, compared="method",
+        metrics=world.metrics, time_limit_s=LIMIT_S, **description  # type: ignore[arg-type]
     )  # fmt: skip
     return ExperimentResults(described, pd.DataFrame(table), pd.DataFrame(), pairs * methods)
 
@@ -160,7 +161,7 @@ def value(name: str, better: Direction = Direction.LOWER, **bounds: float) -> Me
     return Metric(name, "planning", MetricKind.VALUE, better, "rad", **bounds)  # type: ignore[arg-type]
 
 
-TIME = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", LIMIT_S)
+TIME = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit=LIMIT_S)
 SHARE = value("share", Direction.HIGHER, lowest=0.0, highest=1.0)
 COUNT = Metric("count", "planning", MetricKind.COUNT, Direction.LOWER)
 
@@ -241,7 +242,7 @@ def spreads(metrics: int, equal: str) -> World:
 
 def times(rates: tuple[float, ...], centres: tuple[float, ...], spread: float = 0.5, limit: float = LIMIT_S) -> World:
     """Returns a world of times that are censored in failures; scenes are harder for all methods or easier."""
-    metric = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit)
+    metric = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit=limit)
 
     def draw(generator: Generator, pairs: int) -> Draw:
         scene = generator.normal(0.0, 0.3, (pairs, 1))

@@ -16,7 +16,9 @@ def record_of(spec: EpisodeSpec, status: EpisodeStatus = EpisodeStatus.SUCCEEDED
     """Returns a record whose values follow from the episode alone."""
     known = {"success": 1.0, "task_time": spec.seed % 1000 / 1000}
     metrics = {name: known[name] for name in spec.settings.metric_names}
-    return EpisodeRecord(spec, status, "", cause, time.time(), 0.01, 1.0, metrics)
+    return EpisodeRecord(
+        spec, status, outcome="", cause=cause, begun=time.time(), wall_s=0.01, simulated_s=1.0, metrics=metrics
+    )
 
 
 class QuickRunner:

@@ -44,13 +44,63 @@ def metrics() -> tuple[Metric, ...]:
     """Returns a metric of each kind, of several components."""
     lower, higher = Direction.LOWER, Direction.HIGHER
     return (
-        Metric("success", "task", MetricKind.RATE, higher, "", None, "The object stands where it should."),
-        Metric("task_time", "task", MetricKind.TIME, lower, "s", LIMIT_S, "From the first state to the last."),
-        Metric("candidates", "generation", MetricKind.VALUE, higher, "", None, "Grasps that were offered."),
-        Metric("planning_time", "planning", MetricKind.TIME, lower, "s", 5.0, "Sum over all requests of the episode."),
-        Metric("path_length", "planning", MetricKind.VALUE, lower, "rad", None, "Joint space, all motions."),
-        Metric("tracking_error", "execution", MetricKind.VALUE, lower, "rad", None, "Largest of any joint."),
-        Metric("slip", "grasp", MetricKind.VALUE, lower, "m", None, "Of the object in the gripper, while lifted."),
+        Metric(
+            "success", "task", MetricKind.RATE, higher, "", limit=None, description="The object stands where it should."
+        ),
+        Metric(
+            "task_time",
+            "task",
+            MetricKind.TIME,
+            lower,
+            "s",
+            limit=LIMIT_S,
+            description="From the first state to the last.",
+        ),
+        Metric(
+            "candidates",
+            "generation",
+            MetricKind.VALUE,
+            higher,
+            "",
+            limit=None,
+            description="Grasps that were offered.",
+        ),
+        Metric(
+            "planning_time",
+            "planning",
+            MetricKind.TIME,
+            lower,
+            "s",
+            limit=5.0,
+            description="Sum over all requests of the episode.",
+        ),
+        Metric(
+            "path_length",
+            "planning",
+            MetricKind.VALUE,
+            lower,
+            "rad",
+            limit=None,
+            description="Joint space, all motions.",
+        ),
+        Metric(
+            "tracking_error",
+            "execution",
+            MetricKind.VALUE,
+            lower,
+            "rad",
+            limit=None,
+            description="Largest of any joint.",
+        ),
+        Metric(
+            "slip",
+            "grasp",
+            MetricKind.VALUE,
+            lower,
+            "m",
+            limit=None,
+            description="Of the object in the gripper, while lifted.",
+        ),
     )
 
 
@@ -93,7 +143,14 @@ class ReportedExperiment:
         planners = tuple(name for name, _, _ in self.planners)
         factors = (Factor("motion_planner", planners), Factor("object", self.objects))
         return ExperimentDescription(
-            self.name, "task", TEXT, "ab" * 32, factors, "motion_planner", metrics(), time_limit_s=LIMIT_S
+            self.name,
+            "task",
+            text=TEXT,
+            digest="ab" * 32,
+            factors=factors,
+            compared="motion_planner",
+            metrics=metrics(),
+            time_limit_s=LIMIT_S,
         )
 
     def specs(self) -> list[EpisodeSpec]:
@@ -155,10 +212,11 @@ class ReportedExperiment:
         cause = "" if success else self.causes[int(random.integers(len(self.causes)))]
         wall_s = float(8.0 + 3.0 * random.random())
         return EpisodeRecord(
-            spec, status, "success" if success else "fail", cause, begun, wall_s, values["task_time"], values,
-            self._spans(spec, status, cause, float(values["planning_time"] or 1.0)) if self.with_spans else (),
-            {"git_revision": "0f3c9d2", "hostname": "lab-pc", "versions": {"ompl": "2.0.1", "numpy": "2.4.6"}},
-            f"{self.name}_files/{spec.number:06d}", f"worker-{spec.number % 2}",
+            spec, status, outcome="success" if success else "fail", cause=cause, begun=begun, wall_s=wall_s,
+            simulated_s=values["task_time"], metrics=values,
+            spans=self._spans(spec, status, cause, float(values["planning_time"] or 1.0)) if self.with_spans else (),
+            snapshot={"git_revision": "0f3c9d2", "hostname": "lab-pc", "versions": {"ompl": "2.0.1", "numpy": "2.4.6"}},
+            folder=f"{self.name}_files/{spec.number:06d}", worker=f"worker-{spec.number % 2}",
         )  # fmt: skip
 
     def _values(self, status: EpisodeStatus, random: np.random.Generator, time_s: float) -> dict[str, float | None]:
@@ -185,9 +243,9 @@ class ReportedExperiment:
             failed = status is not EpisodeStatus.SUCCEEDED and index == count - 1
             ended = None if failed and status is EpisodeStatus.TIMED_OUT else now + length
             outcome = "" if ended is None else "fail" if failed else "success"
-            spans.append(Span("state", f"/{name}", now, ended, outcome, failed, cause if failed else ""))
+            spans.append(Span("state", f"/{name}", now, ended, outcome, failed=failed, reason=cause if failed else ""))
             component = {"generate_grasps": "generation", "plan_approach": "planning", "approach": "execution"}
             if name in component:
-                spans.append(Span("component", component[name], now + 0.05 * length, ended, outcome, failed))
+                spans.append(Span("component", component[name], now + 0.05 * length, ended, outcome, failed=failed))
             now += length
         return tuple(spans)

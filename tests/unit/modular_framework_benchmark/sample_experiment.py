@@ -24,7 +24,7 @@ def sample_description(name: str = "picks", digest: str = "d1", **changes: objec
         "compared": "grasp_method",
         "metrics": (
             Metric("success", "task", MetricKind.RATE, Direction.HIGHER),
-            Metric("planning_time", "planning", MetricKind.TIME, Direction.LOWER, "s", 5.0),
+            Metric("planning_time", "planning", MetricKind.TIME, Direction.LOWER, "s", limit=5.0),
             Metric("slipped", "grasp", MetricKind.RATE, Direction.LOWER),
         ),
         "time_limit_s": 60.0,
@@ -67,7 +67,15 @@ def sample_record(
         "metrics": {"success": float(succeeded), "planning_time": 0.125 * (spec.number + 1), "slipped": None},
         "spans": (
             Span("state", "PICK/APPROACH", 0.5, 4.0, "ok"),
-            Span("component", "planning", 0.75, None, "", not succeeded, "" if succeeded else "no motion found"),
+            Span(
+                "component",
+                "planning",
+                0.75,
+                None,
+                "",
+                failed=not succeeded,
+                reason="" if succeeded else "no motion found",
+            ),
         ),
         "snapshot": {"version": "0.1.0-7-gabc", "machine": {"processors": 2}, "seeds": {"episode": spec.seed}},
         "folder": f"picks/episode_{spec.number}",

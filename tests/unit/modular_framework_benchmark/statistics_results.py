@@ -63,7 +63,15 @@ def results_of(
     if objects:
         factors.append(Factor("object", tuple(objects)))
     description = ExperimentDescription(
-        "test", "task", "", "", tuple(factors), "method", tuple(metrics), 60.0, sequential=sequential
+        "test",
+        "task",
+        text="",
+        digest="",
+        factors=tuple(factors),
+        compared="method",
+        metrics=tuple(metrics),
+        time_limit_s=60.0,
+        sequential=sequential,
     )
     return ExperimentResults(description, episodes, pd.DataFrame(), len(episodes) if planned is None else planned)
 

@@ -58,7 +58,10 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
     return EpisodeMeasurements(
         settings=EpisodeSettings(),
         status=status,
-        states=(Span("state", "A", 0.0, 1.0, "fail", True, "because"), Span("state", "B", 1.0, 2.0, "success")),
+        states=(
+            Span("state", "A", 0.0, 1.0, "fail", failed=True, reason="because"),
+            Span("state", "B", 1.0, 2.0, "success"),
+        ),
         task_s=12.5,
         task_wall_s=13.5,
         generation_s=0.75,
@@ -71,8 +74,10 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
             planned(True, 0.1, 1.0, clearance_m=0.03, processor_s=0.04, concurrent=2.0),
             planned(False, 5.0),
             planned(True, 0.3, 2.0, clearance_m=0.02, processor_s=0.08, concurrent=3.0),
-            ComponentReport("execution", "", True, "", 1.0, 3.0, 2.0, motion=Motion(("pan",), TIMES, positions[:, :1])),
-            ComponentReport("execution", "", False, "stopped", 3.5, 3.6, 0.1),
+            ComponentReport(
+                "execution", "", True, "", 1.0, 3.0, wall_s=2.0, motion=Motion(("pan",), TIMES, positions[:, :1])
+            ),
+            ComponentReport("execution", "", False, "stopped", 3.5, 3.6, wall_s=0.1),
         ),
         joints=JointSamples(JOINTS, TIMES, positions, blank, efforts, blank),
         tracking=(TrackingSamples("arm", JOINTS, TIMES, desired, positions),),
@@ -145,7 +150,7 @@ def test_a_mean_has_the_same_bits_in_whatever_sequence_concurrent_plans_ended() 
 
 def test_a_plan_that_was_made_to_see_whether_there_is_one_and_made_again_counts_once() -> None:
     thrown_away, executed = planned(True, 0.1, 1.0), planned(True, 0.1, 3.0)
-    motion = ComponentReport("execution", "", True, "", 1.0, 3.0, 2.0, motion=executed.motion)
+    motion = ComponentReport("execution", "", True, "", 1.0, 3.0, wall_s=2.0, motion=executed.motion)
     measured = measure(
         ["path_length", "motion_duration", "planning_time"],
         replace(episode(), reports=(thrown_away, replace(executed, wall_s=0.3), motion)),

@@ -191,8 +191,8 @@ def _state_spans(end: EpisodeEnd) -> tuple[Span, ...]:
             zero + state["started_s"],
             None if state["ended_s"] is None else zero + state["ended_s"],
             state["outcome"] or "",
-            state["failed"],
-            state["reason"],
+            failed=state["failed"],
+            reason=state["reason"],
         )
         for state in record["states"]
     )
@@ -209,6 +209,14 @@ def _component_spans(end: EpisodeEnd, recording: Mapping[str, Any]) -> list[Span
             generation_end_s = 0.0  # only one generation precedes the task
         ended_s = begin - begun + wall_s
         spans.append(
-            Span("component", entry["component"], begin - begun, ended_s, "", not entry["succeeded"], entry["reason"])
+            Span(
+                "component",
+                entry["component"],
+                begin - begun,
+                ended_s,
+                "",
+                failed=not entry["succeeded"],
+                reason=entry["reason"],
+            )
         )
     return spans

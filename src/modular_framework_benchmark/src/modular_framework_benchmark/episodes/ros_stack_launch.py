@@ -68,7 +68,7 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         {"/task/wait_for_start": True, LAUNCH_SEED: 0, **settings.parameters},
         method_nodes,
         controllers,
-        values.get("wait_for_planning", "").lower() in TRUE_VALUES,
+        can_restart=values.get("wait_for_planning", "").lower() in TRUE_VALUES,
     )
 
 

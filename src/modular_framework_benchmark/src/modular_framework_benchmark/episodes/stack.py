@@ -15,7 +15,7 @@ import threading
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,7 @@ class StackLaunch:
     parameters: Mapping[str, Any]
     method_nodes: tuple[str, ...]
     controllers: tuple[str, ...]
+    _: KW_ONLY
     can_restart: bool
 
 

@@ -115,8 +115,8 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | 
         reading.faults.add(node.entries["name"].location, f"the name '{name}' must be letters, digits and underscores")
         return None
     metric = Metric(
-        name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit,
-        text("description", ""), lowest, highest,
+        name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit=limit,
+        description=text("description", ""), lowest=lowest, highest=highest,
     )  # fmt: skip
     return metric, OwnMetric(name, f"{path}:{function}")
 

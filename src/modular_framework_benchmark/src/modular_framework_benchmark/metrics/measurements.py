@@ -7,7 +7,7 @@ Times are seconds of the simulated clock since the start of the recording; durat
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,7 @@ class ComponentReport:
     reason: str
     started_s: float
     ended_s: float
+    _: KW_ONLY
     wall_s: float
     figures: Mapping[Figure, float] = field(default_factory=dict)
     motion: Motion | None = None

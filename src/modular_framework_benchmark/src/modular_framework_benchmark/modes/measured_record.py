@@ -40,7 +40,16 @@ def broken_record(spec: EpisodeSpec, cause: str, watch: Stopwatch) -> EpisodeRec
         cause: Reason for the failure.
         watch: Stopwatch of the episode.
     """
-    return EpisodeRecord(spec, EpisodeStatus.BROKEN, "", cause, watch.begun, watch.elapsed_s(), None, {})
+    return EpisodeRecord(
+        spec,
+        EpisodeStatus.BROKEN,
+        outcome="",
+        cause=cause,
+        begun=watch.begun,
+        wall_s=watch.elapsed_s(),
+        simulated_s=None,
+        metrics={},
+    )
 
 
 def measured_record(
@@ -67,7 +76,13 @@ def measured_record(
     except MetricError as error:
         return broken_record(spec, str(error), watch)
     span = Span(
-        "component", report.component, report.started_s, report.ended_s, outcome, not report.succeeded, report.reason
+        "component",
+        report.component,
+        report.started_s,
+        report.ended_s,
+        outcome,
+        failed=not report.succeeded,
+        reason=report.reason,
     )
     return EpisodeRecord(
         spec=spec,

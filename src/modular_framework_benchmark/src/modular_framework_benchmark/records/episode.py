@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -80,6 +80,7 @@ class Span:
     started_s: float
     ended_s: float | None
     outcome: str = ""
+    _: KW_ONLY
     failed: bool = False
     reason: str = ""
 
@@ -105,6 +106,7 @@ class EpisodeRecord:
 
     spec: EpisodeSpec
     status: EpisodeStatus
+    _: KW_ONLY
     outcome: str
     cause: str
     begun: float

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum
 
 from modular_framework_ros.reported_figures import Clock, Source
@@ -53,6 +53,7 @@ class Metric:
     kind: MetricKind
     better: Direction
     unit: str = ""
+    _: KW_ONLY
     limit: float | None = None
     description: str = ""
     lowest: float | None = None
@@ -111,6 +112,7 @@ class ExperimentDescription:
 
     name: str
     mode: str
+    _: KW_ONLY
     text: str
     digest: str
     factors: tuple[Factor, ...]

@@ -34,7 +34,7 @@ class Link:
     target: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FailedEpisode:
     """An unsuccessful episode.
 
@@ -140,13 +140,13 @@ class _EpisodeReader:
         description = self.results.description
         others = [factor.name for factor in description.factors if factor.name != description.compared]
         return FailedEpisode(
-            int(str(row["number"])),
-            str(row[description.compared]),
-            ", ".join(f"{name} {row[name]}" for name in others),
-            int(str(row["seed"])),
-            EpisodeStatus(str(row["status"])),
-            str(row["cause"]),
-            episode_links(str(row["folder"] or ""), self.database_folder, self.report_folder),
+            number=int(str(row["number"])),
+            method=str(row[description.compared]),
+            levels=", ".join(f"{name} {row[name]}" for name in others),
+            seed=int(str(row["seed"])),
+            status=EpisodeStatus(str(row["status"])),
+            cause=str(row["cause"]),
+            links=episode_links(str(row["folder"] or ""), self.database_folder, self.report_folder),
         )
 
 

@@ -59,7 +59,7 @@ class ReportSource:
     spans_of: Callable[[Sequence[int]], pd.DataFrame]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunFacts:
     """Times and numbers of an experiment's run.
 
@@ -86,7 +86,7 @@ class RunFacts:
     others_max: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
     """Content of a report.
 
@@ -159,9 +159,11 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
         progress_figure(results.episodes, results.planned),
     )
     return ReportContent(
-        description, results.planned, len(results.episodes), _run_facts(results, source.snapshots), analysis, metrics,
-        levels, spans, chosen, failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
-        commands_to_repeat(results, recorded, source.database),
+        description=description, planned=results.planned, finished=len(results.episodes),
+        facts=_run_facts(results, source.snapshots), analysis=analysis, metrics=metrics, levels=levels, spans=spans,
+        chosen=chosen, failures=failures, figures=tuple(figures), recorded=recorded,
+        warnings=warnings_of(results, recorded, source.snapshots),
+        commands=commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
 
 
@@ -196,20 +198,30 @@ def _present(*figures: NamedFigure | None) -> list[NamedFigure]:
 def _run_facts(results: ExperimentResults, snapshots: SnapshotValues) -> RunFacts:
     episodes = results.episodes
     if episodes.empty:
-        return RunFacts(None, None, 0.0, 0, 0, 0, 0, None, None)
+        return RunFacts(
+            begun=None,
+            ended=None,
+            episode_s=0.0,
+            workers=0,
+            seeds=0,
+            trials=0,
+            cold_starts=0,
+            others_median=None,
+            others_max=None,
+        )
     begun, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
     ended = (begun + wall).max()
     others = others_fractions(snapshots)
     return RunFacts(
-        float(begun.min()) if math.isfinite(begun.min()) else None,
-        float(ended) if math.isfinite(ended) else None,
-        float(wall.sum()),
-        int(episodes["worker"].nunique()),
-        int(episodes["seed"].nunique()),
-        int(episodes["trial"].nunique()),
-        int(episodes[COLD_START].sum()) if COLD_START in episodes else 0,
-        statistics.median(others) if others else None,
-        max(others, default=None),
+        begun=float(begun.min()) if math.isfinite(begun.min()) else None,
+        ended=float(ended) if math.isfinite(ended) else None,
+        episode_s=float(wall.sum()),
+        workers=int(episodes["worker"].nunique()),
+        seeds=int(episodes["seed"].nunique()),
+        trials=int(episodes["trial"].nunique()),
+        cold_starts=int(episodes[COLD_START].sum()) if COLD_START in episodes else 0,
+        others_median=statistics.median(others) if others else None,
+        others_max=max(others, default=None),
     )
 
 

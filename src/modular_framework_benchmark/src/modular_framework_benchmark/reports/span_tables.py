@@ -18,7 +18,7 @@ from modular_framework_benchmark.statistics.observations import methods_of
 MAX_TIMELINES = 12
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SpanSummary:
     """Time of a state or component in the episodes of a method.
 
@@ -113,14 +113,14 @@ def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.
     rows = totals.rename(columns={results.description.compared: "method"}).to_dict("records")
     summaries = [
         SpanSummary(
-            str(row["kind"]),
-            str(row["name"]),
-            str(row["method"]),
-            int(row["count"]),
-            int(row["failed"]),
-            int(row["count"] - row["ended"]),
-            float(row["total_s"] / row["ended"]) if row["ended"] else float("nan"),
-            float(row["covered_s"] / episodes[row["method"]]),
+            kind=str(row["kind"]),
+            name=str(row["name"]),
+            method=str(row["method"]),
+            runs=int(row["count"]),
+            failed=int(row["failed"]),
+            unended=int(row["count"] - row["ended"]),
+            mean_s=float(row["total_s"] / row["ended"]) if row["ended"] else float("nan"),
+            per_episode_s=float(row["covered_s"] / episodes[row["method"]]),
         )
         for row in rows
         if row["method"] in episodes.index

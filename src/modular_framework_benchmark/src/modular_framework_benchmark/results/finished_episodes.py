@@ -191,7 +191,15 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
         simulated_s=run["simulated_s"],
         metrics={name: None if run[name] is None else float(run[name]) for name in names},
         spans=tuple(
-            Span(each.kind, each.name, each.started_s, each.ended_s, each.outcome, bool(each.failed), each.reason)
+            Span(
+                each.kind,
+                each.name,
+                each.started_s,
+                each.ended_s,
+                each.outcome,
+                failed=bool(each.failed),
+                reason=each.reason,
+            )
             for each in spans
         ),
         snapshot=_read_snapshot(connection, json.loads(rest.snapshot)),

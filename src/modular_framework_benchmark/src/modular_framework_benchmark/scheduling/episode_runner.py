@@ -46,4 +46,14 @@ def unrun_record(
         worker: Name of the worker.
     """
     metrics = dict.fromkeys(spec.settings.metric_names)
-    return EpisodeRecord(spec, status, "", cause, begun, wall_s, None, metrics=metrics, worker=worker)
+    return EpisodeRecord(
+        spec,
+        status,
+        outcome="",
+        cause=cause,
+        begun=begun,
+        wall_s=wall_s,
+        simulated_s=None,
+        metrics=metrics,
+        worker=worker,
+    )

@@ -112,7 +112,7 @@ class MethodSummary:
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PairCounts:
     """Numbers of compared pairs and episodes.
 

@@ -67,7 +67,14 @@ def compare_pair(table: EpisodeTable, metric: Metric, first: str, second: str, s
 
 
 def _empty_finding(first: str, second: str, metric: Metric) -> Finding:
-    return Finding(first, second, PairCounts(0, 0, 0, 0, 0, 0, 0, 0, 0, False), metric=metric)
+    return Finding(
+        first,
+        second,
+        PairCounts(
+            pairs=0, units=0, won=0, lost=0, failed=0, broken=0, missing=0, unlike=0, unmatched=0, at_random=False
+        ),
+        metric=metric,
+    )
 
 
 def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
