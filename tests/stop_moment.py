@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ros_session import Launch, RosSession
+from modular_framework_testing.ros_session import Launch, RosSession
 
 STOPPED_WITHIN_S = 1.0
 AT_REST_RAD_S = 0.02

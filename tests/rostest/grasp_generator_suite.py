@@ -24,7 +24,8 @@ from modular_framework_core.msg import StandardisedGrasp
 
 sys.path.insert(0, str(Path(__file__).parent / "modular_framework_core"))
 from fake_move_group import FakeMoveGroup  # noqa: E402
-from ros_session import until  # noqa: E402
+
+from modular_framework_testing.ros_session import until  # noqa: E402
 
 BOX_SIZE = (0.04, 0.07, 0.1)
 APPROACH_M, LIFT_M = 0.10, 0.15

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from ros_session import RosSession, pytest_runtest_makereport  # noqa: E402, F401
+from modular_framework_testing.ros_session import RosSession  # noqa: E402
+from modular_framework_testing.ros_session_report import pytest_runtest_makereport  # noqa: E402, F401
 
 
 @pytest.fixture

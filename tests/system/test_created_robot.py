@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pybullet_data
-from ros_session import RosSession
+
+from modular_framework_testing.ros_session import RosSession
 
 CREATE = Path(__file__).parents[2] / "src" / "modular_framework_setup" / "scripts" / "create_robot"
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"

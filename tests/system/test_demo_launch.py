@@ -9,7 +9,8 @@ import subprocess
 import sys
 
 import pytest
-from ros_session import RosSession, until
+
+from modular_framework_testing.ros_session import RosSession, until
 
 SCRIPT = """
 import json

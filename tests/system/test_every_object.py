@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 from pick_objects import OBJECTS
-from ros_session import RosSession
+
+from modular_framework_testing.ros_session import RosSession
 
 TESTS = Path(__file__).parents[1]
 SCRIPT = TESTS.parent / "src" / "modular_framework_api" / "task_constructor_scripts" / "simulation_pick.yaml"

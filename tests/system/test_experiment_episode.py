@@ -17,13 +17,13 @@ import av
 import numpy as np
 import pytest
 import rosgraph
-from ros_session import processes_with
 
 from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
 from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
 from modular_framework_benchmark.metrics.registry import METRICS
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import PlacedObject, RecordedFiles
+from modular_framework_core.launching.launch_session import processes_with
 
 MARK = "EPISODE_TEST"
 ENOUGH_S = 240.0

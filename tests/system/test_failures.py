@@ -14,9 +14,10 @@ from xmlrpc.client import ServerProxy
 
 import pytest
 import rosgraph
-from ros_session import Launch, RosSession
 from roslaunch.config import load_config_default
 from roslaunch.rlutil import resolve_launch_arguments
+
+from modular_framework_testing.ros_session import Launch, RosSession
 
 TASK_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 60.0
@@ -34,9 +35,8 @@ REQUIRED = (
 LAST_STAMP = """
 import sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
 import rospy
-from ros_session import until
+from modular_framework_testing.ros_session import until
 from sensor_msgs.msg import JointState
 rospy.init_node("last_stamp", disable_signals=True)
 publisher = rospy.Publisher("/joint_states", JointState, queue_size=1)
@@ -44,7 +44,7 @@ message = JointState(name=["elbow_joint"], position=[1.3870131566])
 message.header.stamp = rospy.Time(2**32 - 1)
 def ended():
     publisher.publish(message)
-    return not Path("/proc", sys.argv[2]).exists()
+    return not Path("/proc", sys.argv[1]).exists()
 until(ended, "robot_state_publisher has ended")
 """
 KILLED = ("move_group", "moveit_grasp_action_server", "rosout")
@@ -74,7 +74,7 @@ def test_a_joint_state_of_the_last_second_that_a_stamp_can_name_does_not_end_the
     launch = session.run_framework(**HEADLESS)
     _wait_for_text(launch, "first state running", 120.0)
     before = _pid_of(session, "robot_state_publisher")
-    command = [sys.executable, "-c", LAST_STAMP, str(Path(__file__).parents[1]), str(before)]
+    command = [sys.executable, "-c", LAST_STAMP, str(before)]
     subprocess.run(command, env=session.env, check=True, timeout=60.0)
     assert launch.wait(TASK_TIMEOUT_S) == 0, launch.log()
     assert "[robot_state_publisher-" in launch.log() and "restarting process" in launch.log()

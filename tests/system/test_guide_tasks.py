@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ros_session import Launch, RosSession
+
+from modular_framework_testing.ros_session import Launch, RosSession
 
 TESTS = Path(__file__).resolve().parents[1]
 API = TESTS.parent / "src" / "modular_framework_api"

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_session import RosSession, free_port
+
+from modular_framework_testing.ros_session import RosSession, free_port
 
 TASK_TIMEOUT_S = 240.0
 WRAPPER = """<launch>

@@ -10,7 +10,8 @@ from urllib.parse import urlparse
 
 import rosgraph
 import rospy
-from ros_session import RosSession, until
+
+from modular_framework_testing.ros_session import RosSession, until
 
 ROOT = Path(__file__).parents[2]
 LISTENING = "0A"  # state of a socket in /proc/net/tcp

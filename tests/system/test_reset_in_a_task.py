@@ -6,7 +6,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from ros_session import RosSession
+from modular_framework_testing.ros_session import RosSession
 
 TASK_TIMEOUT_S = 240.0
 RESET = """

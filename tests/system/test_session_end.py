@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import signal
 
-from ros_session import RosSession, until
+from modular_framework_testing.ros_session import RosSession, until
 
 
 def test_a_session_whose_roslaunch_was_killed_leaves_no_master_behind(session: RosSession) -> None:

@@ -9,7 +9,8 @@ import subprocess
 import sys
 
 import pytest
-from ros_session import RosSession
+
+from modular_framework_testing.ros_session import RosSession
 
 TASK_TIMEOUT_S = 180.0
 LIFTED_M = 0.10

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ros_session import RosSession, until
+from modular_framework_testing.ros_session import RosSession, until
 
 CONFIG = Path(__file__).parents[2] / "src/modular_framework_api/config"
 TASK_TIMEOUT_S = 180.0

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 import rospy
-from ros_session import RosSession, executable, until
 from sensor_msgs.msg import JointState
+
+from modular_framework_testing.ros_session import RosSession, executable, until
 
 LIMIT = "<limit lower='-0.3' upper='1.7' effort='1' velocity='1'/>"
 MIMIC = "<mimic joint='turn' multiplier='-1'/>"

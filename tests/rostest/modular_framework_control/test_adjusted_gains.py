@@ -12,10 +12,11 @@ import rospy
 from control_msgs.msg import JointControllerState
 from controller_manager_msgs.srv import LoadController, SwitchController, UnloadController
 from dynamic_reconfigure.client import Client
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_testing.ros_session import until
 
 CONTROLLERS = ["states", "push", "lift", "grip", "pair"]
 

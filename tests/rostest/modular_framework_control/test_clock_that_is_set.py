@@ -14,13 +14,13 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from controller_manager_msgs.srv import LoadController, SwitchController
-from ros_session import until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros.robot_hw_node import RobotHwNode
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 HOUR_S = 3600.0
 

@@ -12,9 +12,10 @@ import pytest
 import rospy
 from control_msgs.msg import JointControllerState
 from controller_manager_msgs.srv import ListControllers, ListControllerTypes, LoadController, SwitchController
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
+
+from modular_framework_testing.ros_session import until
 
 MODULE = """
 from modular_framework_control.controller_interface.controller import Controller

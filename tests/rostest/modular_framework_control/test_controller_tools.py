@@ -15,9 +15,10 @@ import pytest
 import rospy
 from controller_manager_msgs.msg import ControllersStatistics
 from controller_manager_msgs.srv import ListControllers
-from ros_session import executable
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
+
+from modular_framework_testing.ros_session import executable
 
 
 @pytest.fixture(scope="module")

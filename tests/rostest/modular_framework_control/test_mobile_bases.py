@@ -22,8 +22,9 @@ from controller_manager_msgs.srv import (
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
-from ros_session import until
 from tf2_msgs.msg import TFMessage
+
+from modular_framework_testing.ros_session import until
 
 
 def call(name: str, kind: Any, *arguments: Any) -> Any:

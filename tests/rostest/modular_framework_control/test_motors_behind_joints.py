@@ -10,9 +10,10 @@ from xml.sax.saxutils import quoteattr
 import pytest
 import rospy
 from controller_manager_msgs.srv import LoadController, SwitchController
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
+
+from modular_framework_testing.ros_session import until
 
 MODULE = """
 import math

@@ -13,12 +13,12 @@ from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from controller_manager_msgs.srv import LoadController, SwitchController
 from diagnostic_msgs.msg import DiagnosticArray
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 ROBOTS = ["left", "right"]
 

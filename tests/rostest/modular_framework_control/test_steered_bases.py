@@ -13,8 +13,9 @@ from controller_manager_msgs.srv import ListControllers, LoadController, SwitchC
 from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
-from ros_session import until
 from tf2_msgs.msg import TFMessage
+
+from modular_framework_testing.ros_session import until
 
 WHEELS = ["front_left", "front_right", "rear_left", "rear_right"]
 

@@ -15,7 +15,6 @@ import pytest
 import rosgraph
 import rospy
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, PlanningSceneInterface
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty, EmptyRequest
 
@@ -27,6 +26,7 @@ from modular_framework_core.commander.arm_commander import ArmCommander
 from modular_framework_core.srv import ListMessages, ListMessagesRequest
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_ros.start_up import wait_for_start
+from modular_framework_testing.ros_session import until
 
 NAMED_WITHIN_S = 10.0
 START = {

@@ -30,7 +30,6 @@ from moveit_msgs.srv import (
     GetPlanningScene,
     GetPlanningSceneResponse,
 )
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -39,6 +38,7 @@ from modular_framework_core import srv
 from modular_framework_core.files import default_folders
 from modular_framework_core.msg import ManagerChange, StandardisedGrasp
 from modular_framework_core.srv import GetModifiedACMRequest, UpdateACMEntryRequest
+from modular_framework_testing.ros_session import until
 
 JOINT_STATES = """
 up: {a: 1.5707963268, b: 0.1}

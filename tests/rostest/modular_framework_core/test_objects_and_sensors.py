@@ -13,11 +13,11 @@ import rosservice
 import tf2_ros
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from ros_session import Launch, executable
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from modular_framework_core import srv
+from modular_framework_testing.ros_session import Launch, executable
 
 SENSORS = """
 fixed_kinect: {frame_id: simulated_kinect2, origin_frame_id: world, frame_x: -0.1645, frame_y: 0.375, frame_z: 2.72,

@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 import rospy
 from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
-from ros_session import executable
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
+
+from modular_framework_testing.ros_session import executable
 
 CONTROLLERS = """
 joint_state_controller: {type: joint_state_controller/JointStateController, publish_rate: 50}

@@ -16,12 +16,12 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 import rospy
-from ros_session import RosSession, executable
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from modular_framework_core.srv import ListMessages, ListMessagesRequest
 from modular_framework_ros.calls import CallError, call_service
+from modular_framework_testing.ros_session import RosSession, executable
 
 FROZEN_WITHIN_S = 10.0
 """From the stop of a node's process to the end of what waits for it [s]."""

@@ -10,8 +10,9 @@ import pytest
 import rospy
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene
-from ros_session import executable
 from shape_msgs.msg import SolidPrimitive
+
+from modular_framework_testing.ros_session import executable
 
 SCENE = Path(__file__).parents[3] / "src" / "modular_framework_description" / "scenes" / "ur5_setup.scene"
 

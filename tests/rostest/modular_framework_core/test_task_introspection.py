@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 import rosgraph
 import rospy
-from ros_session import RosSession
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+
+from modular_framework_testing.ros_session import RosSession
 
 STAY = """
 import rospy

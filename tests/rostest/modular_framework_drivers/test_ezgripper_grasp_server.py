@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from ros_session import free_port, until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -19,6 +18,7 @@ from modular_framework_core.grasping.grasp_messages import generate_pose_stamped
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
 from modular_framework_drivers.emulators.command_port import send_command
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import free_port, until
 
 JOINT = "ezgripper_knuckle_palm_L1_1"
 LAUNCH = """<launch>

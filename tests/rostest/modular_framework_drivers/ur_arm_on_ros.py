@@ -11,7 +11,6 @@ from typing import Any
 
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -20,6 +19,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from modular_framework_drivers.emulators.command_port import send_command
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 START = [3.1375783963, -1.6559683943, 1.3870131566, -1.2662363723, -1.5707963268, 0.0]
 LAUNCH = """<launch>

@@ -34,10 +34,11 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK
-from ros_session import hears, until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header, String
+
+from modular_framework_testing.ros_session import hears, until
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_moveit_config)/launch/move_group.launch">

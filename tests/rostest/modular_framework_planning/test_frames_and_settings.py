@@ -44,11 +44,11 @@ from planning_wire import (
     tip_pose,
     vector,
 )
-from ros_session import until
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 UNTURNED = Quaternion(0, 0, 0, 1)
 pytestmark = [pytest.mark.usefixtures("clean_scene")]

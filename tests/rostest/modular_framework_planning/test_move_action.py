@@ -19,10 +19,10 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request
-from ros_session import until
 from std_msgs.msg import String
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 PAN = "shoulder_pan_joint"
 GOAL_PAN = START[0] - 1.2

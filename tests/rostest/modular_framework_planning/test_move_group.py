@@ -52,12 +52,12 @@ from planning_wire import (
     request,
     table,
 )
-from ros_session import until
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
 

@@ -28,10 +28,11 @@ from moveit_msgs.msg import (
     RobotTrajectory,
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK, GetStateValidity
-from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import MultiDOFJointTrajectoryPoint
 from visualization_msgs.msg import InteractiveMarkerInit
+
+from modular_framework_testing.ros_session import until
 
 MOBILE = '<group name="mobile"><joint name="virtual_joint"/><group name="panda_arm"/></group>'
 ROOT, TIP, UPRIGHT = "panda_link0", "panda_link8", Quaternion(0.0, 0.0, 0.0, 1.0)

@@ -38,11 +38,11 @@ from planning_wire import (
     report_of,
     table,
 )
-from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 OPEN, CLOSED = 0.0, 1.2
 PALM_TO_BLOCK = 0.155  # from ee_link along its x, which points down in these grasps, to the middle of the block [m]

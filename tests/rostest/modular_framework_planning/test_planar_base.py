@@ -20,7 +20,6 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamp
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, RobotCommander
 from moveit_msgs.msg import DisplayTrajectory, RobotState
 from moveit_msgs.srv import GetPositionFK
-from ros_session import until
 from std_msgs.msg import Header
 from visualization_msgs.msg import (
     InteractiveMarkerControl,
@@ -28,6 +27,8 @@ from visualization_msgs.msg import (
     InteractiveMarkerInit,
     InteractiveMarkerUpdate,
 )
+
+from modular_framework_testing.ros_session import until
 
 MOBILE = """<group name="mobile"><joint name="virtual_joint"/><group name="panda_arm"/></group>
 <group_state name="dock" group="mobile"><joint name="virtual_joint" value="1.5 -0.5 0.6"/>

@@ -15,8 +15,9 @@ from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
 from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents, RobotState
 from moveit_msgs.srv import GetPlanningScene, GetPositionFK
-from ros_session import until
 from std_msgs.msg import Header
+
+from modular_framework_testing.ros_session import until
 
 ROOT, HEIGHT, UPRIGHT = "panda_link0", 0.5, Quaternion(0.0, 0.0, 0.0, 1.0)
 LAUNCH = f"""<launch>

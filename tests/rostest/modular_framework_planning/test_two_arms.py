@@ -18,11 +18,11 @@ from moveit_commander import MoveGroupCommander, RobotCommander
 from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal, MoveItErrorCodes, PositionIKRequest, RobotState
 from moveit_msgs.srv import GetPositionFK, GetPositionIK
 from planning_wire import report_of
-from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 SIDES = ("left", "right")
 JOINTS = {side: [f"{side}_joint{number}" for number in range(1, 8)] for side in SIDES}

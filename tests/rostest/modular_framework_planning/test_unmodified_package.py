@@ -39,10 +39,11 @@ from moveit_msgs.srv import (
     GetPositionIK,
     GetStateValidity,
 )
-from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
+
+from modular_framework_testing.ros_session import until
 
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 REACHING = [0.6, 0.3, 0.0, -1.7, 0.0, 2.0, 0.785]

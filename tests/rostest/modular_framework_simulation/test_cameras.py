@@ -16,10 +16,11 @@ import pytest
 import rospy
 from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_srvs.srv import Empty
+
+from modular_framework_testing.ros_session import until as wait_until
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>

@@ -15,8 +15,9 @@ import rospkg
 import rospy
 import rosservice
 from gazebo_msgs.srv import GetPhysicsProperties, GetWorldProperties
-from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
+
+from modular_framework_testing.ros_session import until as wait_until
 
 PUBLIC_ARGUMENTS = {
     "paused", "use_sim_time", "extra_gazebo_args", "gui", "recording", "headless", "debug", "physics", "verbose",

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import WrenchStamped
-from ros_session import until
 from sensor_msgs.msg import PointCloud2
+
+from modular_framework_testing.ros_session import until
 
 INERTIA = '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>'
 ROBOT = f"""<robot name="scale"><link name="world"/>

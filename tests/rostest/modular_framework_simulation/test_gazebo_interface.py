@@ -25,11 +25,12 @@ from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure
 from gazebo_msgs import msg, srv
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
-from ros_session import hears, until
 from roscpp.srv import GetLoggers, SetLoggerLevel
 from rosgraph_msgs.msg import Clock, Log
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty, Trigger
+
+from modular_framework_testing.ros_session import hears, until
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "gazebo_interface.md"
 CHANGING = ("spawn_", "set_", "delete_", "apply_", "clear_", "pause_", "unpause_", "reset_")

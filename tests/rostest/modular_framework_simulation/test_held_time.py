@@ -18,7 +18,6 @@ import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from gazebo_msgs.srv import GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ros_session import until as wait_until
 from sensor_msgs.msg import JointState
 from simulation_time_msgs.srv import AdvanceTime, HoldTime
 from std_srvs.srv import Trigger
@@ -26,6 +25,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.simulated_time import SimulatedTime
+from modular_framework_testing.ros_session import until as wait_until
 
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_ur5 import ARM, BALL  # noqa: E402

@@ -14,11 +14,11 @@ import rospkg
 import rospy
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
-from ros_session import until as wait_until
 
 from modular_framework_core import srv
 from modular_framework_core.scene.manage_object import parse_request, request_to_delete
 from modular_framework_core.scene.ros_manage_object import RefusedError, delete, spawn
+from modular_framework_testing.ros_session import until as wait_until
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fake_planning_scene import FakePlanningScene  # noqa: E402

@@ -13,9 +13,9 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene
-from ros_session import until
 
 from modular_framework_planning.octomap.encoding import read_stream
+from modular_framework_testing.ros_session import until
 from modular_framework_urdf.rotations import rotate_vector
 
 LAUNCH = """<launch>

@@ -14,11 +14,11 @@ from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryG
 from controller_manager_msgs.srv import ListControllers
 from gazebo_msgs.srv import ApplyBodyWrench, DeleteModel, GetModelState, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
-from ros_session import until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_ur5 import ARM, BALL, LAUNCH  # noqa: E402

@@ -12,9 +12,10 @@ import rospy
 from gazebo_msgs.msg import ContactsState
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Pose, WrenchStamped
-from ros_session import until
 from sensor_msgs.msg import Image, Imu, LaserScan
 from std_srvs.srv import Empty
+
+from modular_framework_testing.ros_session import until
 
 INERTIA = "<inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/>"
 ROBOT = f"""<robot name="mast"><link name="world"/>

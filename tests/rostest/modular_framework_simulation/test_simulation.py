@@ -30,7 +30,6 @@ from gazebo_msgs.srv import (
     SpawnModel,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ros_session import executable, until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -38,6 +37,7 @@ from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import executable, until
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fake_planning_scene import FakePlanningScene  # noqa: E402

@@ -24,7 +24,6 @@ from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import DeleteModel, GetPhysicsProperties, GetWorldProperties, SetModelState, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import CollisionObject, DisplayTrajectory, PlanningScene, RobotTrajectory
-from ros_session import free_port, until
 from sensor_msgs.msg import Image, JointState
 from shape_msgs.msg import SolidPrimitive
 from simulation_time_msgs.srv import AdvanceTime
@@ -32,6 +31,8 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
+
+from modular_framework_testing.ros_session import free_port, until
 
 URDF = """<robot name="arm"><link name="world"/>
   <link name="upper"><visual><origin xyz="0 0 0.5"/><geometry><box size="0.1 0.1 1"/></geometry></visual>

@@ -19,7 +19,6 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from control_msgs.msg import GripperCommand, GripperCommandAction, GripperCommandGoal, GripperCommandResult
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
-from ros_session import until
 from rospy.impl.tcpros_base import TCPROSTransport
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
@@ -44,6 +43,7 @@ from modular_framework_states.states.spawn_object import SpawnObject
 from modular_framework_states.states.store import Store
 from modular_framework_states.states.wait import Wait
 from modular_framework_states.states.wait_for_message import WaitForMessage
+from modular_framework_testing.ros_session import until
 
 SERVERS = itertools.count(1)
 LAUNCH = """<launch><node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"

@@ -33,11 +33,12 @@ from moveit_msgs.msg import (
     TrajectoryConstraints,
 )
 from moveit_msgs.srv import GetPositionFK
-from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_testing.ros_session import until
 
 START = {
     "shoulder_pan_joint": 1.57,

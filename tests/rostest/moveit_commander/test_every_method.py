@@ -44,9 +44,10 @@ from moveit_msgs.msg import (
     TrajectoryConstraints,
 )
 from moveit_msgs.srv import GetPlannerParams, GetPositionFK, SetPlannerParams
-from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_testing.ros_session import until
 
 CLASSES = (
     RobotCommander,

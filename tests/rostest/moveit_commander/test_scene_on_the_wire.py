@@ -42,8 +42,9 @@ from moveit_msgs.msg import (
     RobotTrajectory,
 )
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
-from ros_session import until
 from std_msgs.msg import Header
+
+from modular_framework_testing.ros_session import until
 
 PALM = "ezgripper_palm_link"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"

@@ -15,9 +15,10 @@ import pytest
 import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
-from ros_session import until as wait_until
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2, PointField
+
+from modular_framework_testing.ros_session import until as wait_until
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))

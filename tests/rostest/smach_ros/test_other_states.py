@@ -10,12 +10,12 @@ import pytest
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestRequestAction, TestRequestGoal
 from actionlib_msgs.msg import GoalStatus
-from ros_session import until
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 import smach
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.ros_session import until
 
 pytestmark = pytest.mark.usefixtures("ros_session")
 

@@ -15,6 +15,8 @@ from typing import Any
 import psutil
 import pytest
 
+from modular_framework_testing.ros_session import until
+
 ROSTEST = Path(__file__).parents[2] / "rostest"
 PACKAGES = sorted(folder for folder in ROSTEST.iterdir() if list(folder.glob("test_*.py")))
 
@@ -151,8 +153,6 @@ def test_sigterm_ends_the_suites_that_run_and_what_they_started(runner: ModuleTy
         f"    open({str(started)!r}, 'w').write(f'{{child.pid}} ')\n"
         "    time.sleep(600)\n"
     )
-
-    from ros_session import until  # beside the script, like the other modules that it imports
 
     children: list[psutil.Process] = []
 
