@@ -3,7 +3,6 @@
 
 - A benchmark that is started without the workspace, as `benchmarks/planning --help` in any shell, starts again by
   `./install.sh exec`, with the workspace's interpreter and packages.
-- The modules of the tests that benchmarks share can be imported.
 - SIGTERM ends a benchmark as an interrupt does, with one line. Programs that it started and that still run at its end
   are killed.
 """
@@ -20,13 +19,6 @@ from pathlib import Path
 from types import TracebackType
 
 ROOT = Path(__file__).resolve().parents[1]
-SHARED = (  # several have a module `conftest`: the first is found
-    "tests/unit/modular_framework_planning",
-    "tests/unit/modular_framework_benchmark",
-    "tests/rostest/modular_framework_planning",
-    "tests/unit/modular_framework_simulation",
-    "tests",
-)
 MARK = "MODULAR_FRAMEWORK_BENCHMARK"
 """Variable of the environment that programs of a benchmark have; a benchmark within another one extends its value."""
 _STARTS = "starts in the workspace"
@@ -38,7 +30,6 @@ def _enter() -> None:
     if not sourced and not outer:
         os.environ[MARK] = _STARTS
         os.execv(ROOT / "install.sh", ["install.sh", "exec", *sys.argv])
-    sys.path += [str(ROOT / path) for path in SHARED]
     os.environ[MARK] = ("" if outer == _STARTS else outer) + uuid.uuid4().hex
     if multiprocessing.current_process().name == "MainProcess":
         for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from modular_framework_testing.ros_session import RosSession  # noqa: E402
-from modular_framework_testing.ros_session_report import pytest_runtest_makereport  # noqa: E402, F401
+from modular_framework_testing.ros_session import RosSession
+from modular_framework_testing.ros_session_report import pytest_runtest_makereport  # noqa: F401
 
 
 @pytest.fixture

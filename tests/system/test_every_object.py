@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pick_objects import OBJECTS
 
+from modular_framework_testing.picks.pick_objects import OBJECTS
 from modular_framework_testing.ros_session import RosSession
 
-TESTS = Path(__file__).parents[1]
-SCRIPT = TESTS.parent / "src" / "modular_framework_api" / "task_constructor_scripts" / "simulation_pick.yaml"
+API = Path(__file__).parents[2] / "src" / "modular_framework_api"
+SCRIPT = API / "task_constructor_scripts" / "simulation_pick.yaml"
 ALL_S = 1800.0
 LIFTED_M = 0.10
 
@@ -38,7 +38,7 @@ def picks() -> Iterator[dict[str, Any]]:
             real_time_factor="0",
         )
         run = subprocess.run(
-            [sys.executable, str(TESTS / "pick_objects.py"), str(SCRIPT)],
+            [sys.executable, "-m", "modular_framework_testing.picks.pick_objects", str(SCRIPT)],
             env=session.env,
             capture_output=True,
             text=True,

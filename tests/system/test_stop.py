@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import pytest
-from stop_moment import AT_REST_RAD_S, stop_a_pick
+
+from modular_framework_testing.picks.stop_moment import AT_REST_RAD_S, stop_a_pick
 
 
 @pytest.mark.parametrize(

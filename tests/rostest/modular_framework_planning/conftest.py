@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planning_wire import ARM, GRIPPER, START, FakeArm, call, tip_pose  # noqa: E402
+from modular_framework_testing.planning.planning_wire import ARM, GRIPPER, START, FakeArm, call, tip_pose  # noqa: E402
 
 
 @dataclass(frozen=True, slots=True)

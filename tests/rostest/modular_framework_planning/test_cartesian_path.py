@@ -11,10 +11,25 @@ import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest
-from planning_wire import ARM, DOWN, GROUP, OK, START, TIP, add, box, call, hold, report_of, tip_pose, vector
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    DOWN,
+    GROUP,
+    OK,
+    START,
+    TIP,
+    add,
+    box,
+    call,
+    hold,
+    report_of,
+    tip_pose,
+    vector,
+)
 
 MAX_VELOCITY, MAX_ACCELERATION = 3.2, 8.0
 pytestmark = [pytest.mark.move_group(service="compute_cartesian_path"), pytest.mark.usefixtures("clean_scene")]

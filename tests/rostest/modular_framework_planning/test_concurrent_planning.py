@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import concurrent_motions
 import pytest
-from planning_wire import FakeArm
+
+from modular_framework_testing.planning import concurrent_motions
+from modular_framework_testing.planning.planning_wire import FakeArm
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -28,7 +28,12 @@ from moveit_msgs.srv import (
     GetPositionIK,
     GetStateValidity,
 )
-from planning_wire import (
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
+from std_msgs.msg import Header
+
+from modular_framework_testing.planning.planning_wire import (
     ARM,
     DOWN,
     GROUP,
@@ -47,10 +52,6 @@ from planning_wire import (
     tip_pose,
     vector,
 )
-from scipy.spatial.transform import Rotation
-from sensor_msgs.msg import JointState
-from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
-from std_msgs.msg import Header
 
 CODES = MoveItErrorCodes
 NAN = float("nan")

@@ -25,7 +25,11 @@ from moveit_msgs.msg import (
     PositionIKRequest,
 )
 from moveit_msgs.srv import GetPlanningScene, GetPositionIK
-from planning_wire import (
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
     ARM,
     DOWN,
     GROUP,
@@ -44,10 +48,6 @@ from planning_wire import (
     tip_pose,
     vector,
 )
-from std_msgs.msg import Header
-from visualization_msgs.msg import Marker, MarkerArray
-
-from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_testing.ros_session import until
 
 UNTURNED = Quaternion(0, 0, 0, 1)

@@ -14,12 +14,26 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes, PlanningScene, PositionIKRequest, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK
-from planning_wire import ARM, DOWN, OK, START, FakeArm, add, box, call, plan, report_of, request, tip_pose, vector
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
 from modular_framework_planning.visualization.interactive_goal import FOLLOW_PERIOD_S, InteractiveGoal
 from modular_framework_planning.visualization.move_group_client import planners_of_group
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    DOWN,
+    OK,
+    START,
+    FakeArm,
+    add,
+    box,
+    call,
+    plan,
+    report_of,
+    request,
+    tip_pose,
+    vector,
+)
 
 NODE = "/interactive_goal"
 WORDS_ABOVE_TIP_M = 0.45

@@ -40,13 +40,24 @@ from moveit_msgs.srv import (
     SetPlannerParams,
 )
 from nonsense import STYLES, nonsense
-from planning_wire import ARM, DOWN, GROUP, OK, FakeArm, call, joint_goal, plan, report_of, request
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    DOWN,
+    GROUP,
+    OK,
+    FakeArm,
+    call,
+    joint_goal,
+    plan,
+    report_of,
+    request,
+)
 from modular_framework_testing.ros_session import until
 
 MILLION, MANY = 1_000_000, 100_000

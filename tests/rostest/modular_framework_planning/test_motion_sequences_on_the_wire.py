@@ -24,7 +24,10 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import GetMotionSequence, QueryPlannerInterfaces
-from planning_wire import (
+from sensor_msgs.msg import JointState
+
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
     ARM,
     GRIPPER,
     OK,
@@ -41,9 +44,6 @@ from planning_wire import (
     tip_pose,
     vector,
 )
-from sensor_msgs.msg import JointState
-
-from modular_framework_ros.action_client import SteadyActionClient
 
 PILZ = "pilz_industrial_motion_planner"
 CODES = MoveItErrorCodes

@@ -18,10 +18,20 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     RobotState,
 )
-from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_of, request
 from std_msgs.msg import String
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    OK,
+    START,
+    FakeArm,
+    add,
+    box,
+    joint_goal,
+    report_of,
+    request,
+)
 from modular_framework_testing.ros_session import until
 
 PAN = "shoulder_pan_joint"

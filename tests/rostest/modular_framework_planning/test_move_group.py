@@ -34,7 +34,12 @@ from moveit_msgs.srv import (
     GetStateValidity,
     QueryPlannerInterfaces,
 )
-from planning_wire import (
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
     ARM,
     DOWN,
     GRIPPER,
@@ -52,11 +57,6 @@ from planning_wire import (
     request,
     table,
 )
-from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
-
-from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_testing.ros_session import until
 
 pytestmark = pytest.mark.usefixtures("clean_scene")

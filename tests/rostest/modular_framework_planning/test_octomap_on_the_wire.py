@@ -16,7 +16,6 @@ import tf2_ros
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from moveit_msgs.msg import Constraints, PlanningScene, PlanningSceneComponents, PlanningSceneWorld, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetStateValidity, LoadMap, SaveMap
-from planning_wire import ARM, START, FakeArm, add, box, call
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, PointField
 from std_msgs.msg import Header
 from std_srvs.srv import Empty
@@ -24,6 +23,7 @@ from visualization_msgs.msg import MarkerArray
 
 from modular_framework_planning.octomap.encoding import read_file, read_stream
 from modular_framework_planning.octomap.voxel_map import VoxelMap
+from modular_framework_testing.planning.planning_wire import ARM, START, FakeArm, add, box, call
 from modular_framework_testing.ros_session import until
 
 CAMERA_AT = np.array([-2.5, 0.0, 1.2])

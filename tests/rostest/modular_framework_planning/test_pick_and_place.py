@@ -24,7 +24,11 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import GetPlanningScene, GetPositionFK
-from planning_wire import (
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import (
     ARM,
     GRIPPER,
     GROUP,
@@ -38,10 +42,6 @@ from planning_wire import (
     report_of,
     table,
 )
-from std_msgs.msg import Header
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_testing.ros_session import until
 
 OPEN, CLOSED = 0.0, 1.2

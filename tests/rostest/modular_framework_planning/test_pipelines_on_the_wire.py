@@ -23,7 +23,21 @@ from moveit_msgs.srv import (
     QueryPlannerInterfaces,
     SetPlannerParams,
 )
-from planning_wire import ARM, GROUP, LAUNCH, OK, FakeArm, add, box, call, plan, report_of, request, tip_pose
+
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    GROUP,
+    LAUNCH,
+    OK,
+    FakeArm,
+    add,
+    box,
+    call,
+    plan,
+    report_of,
+    request,
+    tip_pose,
+)
 
 ROOT = Path(__file__).resolve().parents[3]
 POSITIONS = (0.2, -1.57, 1.2, -1.2, -1.57, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from planning_stress_clients import stress
+from modular_framework_testing.planning.planning_stress_clients import stress
 
 
 def test_many_clients_get_right_answers_while_the_scene_changes(ros_session: Any) -> None:

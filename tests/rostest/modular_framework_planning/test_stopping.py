@@ -12,9 +12,9 @@ from typing import Any
 import rospy
 from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal
 from moveit_msgs.srv import GetMotionPlan, GetPositionIK, GetPositionIKRequest
-from planning_wire import ARM, LAUNCH, FakeArm, joint_goal, request
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import ARM, LAUNCH, FakeArm, joint_goal, request
 from modular_framework_testing.ros_session import until
 
 LOADED_S = 1.5

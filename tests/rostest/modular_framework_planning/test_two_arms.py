@@ -17,11 +17,11 @@ from geometry_msgs.msg import PoseStamped
 from moveit_commander import MoveGroupCommander, RobotCommander
 from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal, MoveItErrorCodes, PositionIKRequest, RobotState
 from moveit_msgs.srv import GetPositionFK, GetPositionIK
-from planning_wire import report_of
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_wire import report_of
 from modular_framework_testing.ros_session import until
 
 SIDES = ("left", "right")

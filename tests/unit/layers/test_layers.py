@@ -11,6 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "layers"))
 
 from architecture_drawing import dot_text, draw, is_up_to_date, without_shortcuts  # noqa: E402
+from imports_of_tests import imports_of_tests, python_files  # noqa: E402
 from layer_checks import find_faults  # noqa: E402
 from layer_table import LayerTable, TableError, make_layer_table, read_layer_table  # noqa: E402
 from source_tree import SourceTree, read_source_tree  # noqa: E402
@@ -217,3 +218,22 @@ def test_the_drawing_shows_rooms_and_packages_and_knows_when_it_is_out_of_date(t
     assert ">kitchen</text>" in drawing.read_text()
     modules["house.bedroom.bed"] = "import house.cellar.coal"
     assert not is_up_to_date(dot_text(tree(tmp_path, modules), table()), drawing)
+
+
+@pytest.mark.parametrize("text", ["from fake_arm import Arm", "def run():\n    import fake_arm"])
+@pytest.mark.parametrize("file", ["benchmarks/speed", "src/house/src/house/roof.py"])
+def test_an_import_from_the_tests_fails_in_packages_and_benchmarks(tmp_path: Path, file: str, text: str) -> None:
+    for name, content in (("tests/unit/fake_arm.py", ""), (file, f"#!/usr/bin/env python3\n{text}\n")):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text(content)
+    assert python_files(tmp_path, [file]) == [file]
+    (found,) = imports_of_tests(tmp_path, [file])
+    assert found.startswith(f"{file}:{text.count(chr(10)) + 2}: imports tests/unit/fake_arm.py; allowed: ")
+
+
+def test_imports_of_packages_and_of_modules_beside_the_file_pass(tmp_path: Path) -> None:
+    for name in ("tests", "benchmarks"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "fault_table.py").touch()
+    (tmp_path / "benchmarks" / "faults").write_text("import fault_table\nimport json\nfrom house.roof import tiles\n")
+    assert not list(imports_of_tests(tmp_path, ["benchmarks/faults"]))

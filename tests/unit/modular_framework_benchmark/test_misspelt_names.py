@@ -13,7 +13,13 @@ from pathlib import Path
 
 import pytest
 import yaml
-from misspelt_names import (
+
+from modular_framework_benchmark.commands.mode_runners import known_metrics
+from modular_framework_benchmark.experiments.design import plan_episodes
+from modular_framework_benchmark.experiments.design_text import design_text
+from modular_framework_benchmark.experiments.experiment_file import read_experiment
+from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
+from modular_framework_testing.experiments.misspelt_names import (
     CASES,
     GENERATOR,
     GRASPS,
@@ -35,12 +41,6 @@ from misspelt_names import (
     in_script,
     write_problem,
 )
-
-from modular_framework_benchmark.commands.mode_runners import known_metrics
-from modular_framework_benchmark.experiments.design import plan_episodes
-from modular_framework_benchmark.experiments.design_text import design_text
-from modular_framework_benchmark.experiments.experiment_file import read_experiment
-from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 
 
 @pytest.mark.parametrize("case", CASES[::3], ids=lambda case: f"{case.place} {case.wrong}"[:60])

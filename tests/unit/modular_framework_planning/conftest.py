@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 sys.path += [
     str(ROOT / "src/modular_framework_planning/src"),
+    str(ROOT / "src/modular_framework_testing/src"),
     str(ROOT / "src/modular_framework_urdf/src"),
     str(Path(__file__).parent),
 ]
@@ -19,18 +20,7 @@ sys.path += [
 from modular_framework_planning.errors import ModelError  # noqa: E402
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.robot_model.urdf_document import package_resolver  # noqa: E402
-
-LIMITS = {
-    name: {"has_velocity_limits": True, "max_velocity": 3.0, "has_acceleration_limits": True, "max_acceleration": 5.0}
-    for name in (
-        "shoulder_pan_joint",
-        "shoulder_lift_joint",
-        "elbow_joint",
-        "wrist_1_joint",
-        "wrist_2_joint",
-        "wrist_3_joint",
-    )
-}
+from modular_framework_testing.planning.ur5_limits import LIMITS  # noqa: E402
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 import pytest
-from collision_worlds import random_state, world_with
-from independent_checker import IndependentChecker
 from plain_coal_checker import PlainCoalChecker, samples_of
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
@@ -43,6 +41,8 @@ from modular_framework_planning.planning_scene.planning_scene import (
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_testing.planning.collision_worlds import random_state, world_with
+from modular_framework_testing.planning.independent_checker import IndependentChecker
 
 PLAIN = "plain_coal_checker/PlainCoalChecker"
 SHIPPED = tuple({factory: name for name, factory in reversed(COLLISION_DETECTORS.items())}.values())

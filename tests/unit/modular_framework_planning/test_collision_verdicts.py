@@ -7,13 +7,19 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from collision_worlds import Comparison, Verdicts, compared_around, compared_in, world_with
-from independent_checker import IndependentChecker
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_testing.planning.collision_worlds import (
+    Comparison,
+    Verdicts,
+    compared_around,
+    compared_in,
+    world_with,
+)
+from modular_framework_testing.planning.independent_checker import IndependentChecker
 
 WORLDS = 5
 

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from independent_arms import SEVEN_JOINT_SRDF, SEVEN_JOINT_URDF, seven_joint_flange
 from scipy.interpolate import BPoly
+
+from modular_framework_testing.planning.independent_arms import SEVEN_JOINT_SRDF, SEVEN_JOINT_URDF, seven_joint_flange
 
 pytest.importorskip("moveit_commander", reason="source the workspace")
 

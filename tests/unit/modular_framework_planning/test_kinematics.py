@@ -6,14 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from independent_arms import (
-    SEVEN_JOINT_SRDF,
-    SEVEN_JOINT_URDF,
-    SEVEN_JOINTS,
-    pose_gap,
-    seven_joint_flange,
-    ur5_tool,
-)
 from pose_difference import pose_difference
 
 from modular_framework_planning.errors import PlanningError
@@ -24,6 +16,14 @@ from modular_framework_planning.kinematics.inverse_kinematics import InverseKine
 from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, KinematicsSettings, settings_from
 from modular_framework_planning.kinematics.solution_choice import clearest
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_testing.planning.independent_arms import (
+    SEVEN_JOINT_SRDF,
+    SEVEN_JOINT_URDF,
+    SEVEN_JOINTS,
+    pose_gap,
+    seven_joint_flange,
+    ur5_tool,
+)
 
 TIP = "eg_manipulator"
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import os
 
 import pytest
-from independent_checker import IndependentChecker
-from motion_properties import examine
 
 from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_testing.planning.independent_checker import IndependentChecker
+from modular_framework_testing.planning.motion_properties import examine
 
 SHARE = {"ompl": 8, "ptp": 8, "lin": 12, "stomp": 5}
 LEAST_SOLVED = {"ompl": 0.95, "ptp": 0.25, "lin": 0.25, "stomp": 0.8}  # straight motions are refused where they touch

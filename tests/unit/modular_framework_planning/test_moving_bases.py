@@ -6,8 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from independent_checker import IndependentChecker, sampled
-from independent_checker import box as solid_box
 from mobile_robots import SRDF, URDF, from_quaternion, robot, shifted, tool_in_cart, turned
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -24,6 +22,8 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled
+from modular_framework_testing.planning.independent_checker import box as solid_box
 
 pytest.importorskip("moveit_msgs.msg", reason="source the workspace: the messages are not built")
 

@@ -12,8 +12,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from collision_worlds import shape_of, world_with
-from independent_checker import IndependentChecker
 
 from modular_framework_planning.collision_detection import exact_collision_checker
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
@@ -21,6 +19,8 @@ from modular_framework_planning.collision_detection.exact_collision_checker impo
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
+from modular_framework_testing.planning.collision_worlds import shape_of, world_with
+from modular_framework_testing.planning.independent_checker import IndependentChecker
 
 ARM_WORLDS, ARM_PATHS = 5, 6
 BARS_PATHS, OBSTACLES = 150, 30

@@ -9,8 +9,6 @@ import re
 import numpy as np
 import pinocchio as pin
 import pytest
-from independent_checker import IndependentChecker
-from independent_checker import box as solid_box
 from pose_difference import pose_difference
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
@@ -36,6 +34,8 @@ from modular_framework_planning.planning_scene.planning_scene import (
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
 from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S
+from modular_framework_testing.planning.independent_checker import IndependentChecker
+from modular_framework_testing.planning.independent_checker import box as solid_box
 
 GROUP = "arm_and_manipulator"
 PALM = "ezgripper_palm_link"

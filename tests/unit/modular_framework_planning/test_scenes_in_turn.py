@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from collision_worlds import random_state, shape_of
 from plain_coal_checker import PlainCoalChecker
 from wide_robots import robot as wide_robot
 
@@ -22,6 +21,7 @@ from modular_framework_planning.planning_scene.planning_scene import (
     PlanningScene,
     empty_scene,
 )
+from modular_framework_testing.planning.collision_worlds import random_state, shape_of
 
 CHANGES, STATES = 150, 12
 NEAR = 0.001  # [m]; of contact, where the two checkers may say something else

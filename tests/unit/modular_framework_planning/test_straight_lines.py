@@ -8,7 +8,6 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
-from independent_arms import SEVEN_JOINT_SRDF, SEVEN_JOINT_URDF, seven_joint_flange
 
 from modular_framework_planning.cartesian.cartesian_path import JumpThresholds, straight_line
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -27,6 +26,7 @@ from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeli
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.line_timing import time_line
+from modular_framework_testing.planning.independent_arms import SEVEN_JOINT_SRDF, SEVEN_JOINT_URDF, seven_joint_flange
 
 BENT = np.array([0.1, -0.6, 0.1, -2.0, 0.1, 1.5, 0.7])
 LIMITS = {"max_trans_vel": 1.0, "max_trans_acc": 2.25, "max_trans_dec": -5.0, "max_rot_vel": 1.57}

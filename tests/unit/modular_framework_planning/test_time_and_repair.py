@@ -12,7 +12,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from independent_checker import IndependentChecker, box
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constrained_motion import ConstrainedMotion
@@ -37,6 +36,7 @@ from modular_framework_planning.planning_scene.planning_scene import CollisionOb
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
 from modular_framework_planning.trajectory_processing.time_parameterization import parameterize
+from modular_framework_testing.planning.independent_checker import IndependentChecker, box
 
 GROUP = "arm_and_manipulator"
 START = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)

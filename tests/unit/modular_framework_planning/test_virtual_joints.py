@@ -10,8 +10,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from independent_checker import IndependentChecker
-from independent_checker import box as solid_box
 from mobile_robots import SRDF, URDF, from_quaternion, robot, tool_in_cart, turned
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
@@ -28,6 +26,8 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_testing.planning.independent_checker import IndependentChecker
+from modular_framework_testing.planning.independent_checker import box as solid_box
 
 pytest.importorskip("moveit_msgs.msg", reason="source the workspace: the messages are not built")
 

@@ -6,8 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from independent_checker import IndependentChecker, sampled
-from independent_checker import box as solid_box
 from mobile_robots import shifted
 from wide_robots import SRDF, URDF, robot, tool
 
@@ -33,6 +31,8 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
+from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled
+from modular_framework_testing.planning.independent_checker import box as solid_box
 
 ARM = ("pan", "lift", "elbow", "roll")
 SIDES = ("left", "right")

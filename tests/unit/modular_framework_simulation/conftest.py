@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
@@ -15,10 +13,8 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.engine_choice import PYBULLET
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_testing.simulation.simulated_samples import solid
 from modular_framework_urdf.rotations import Vector3
-
-sys.path.insert(0, str(Path(__file__).parent))
-from simulated_samples import solid  # noqa: E402
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from simulated_samples import exact_state, run, solid
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.loop.referee import Referee
@@ -26,6 +25,7 @@ from modular_framework_simulation.physics.physics_engine import BASE_INDEX
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, JointSettings, Twist
+from modular_framework_testing.simulation.simulated_samples import exact_state, run, solid
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
-from simulated_samples import solid
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -25,6 +24,7 @@ from modular_framework_simulation.sensors import drawing_choice
 from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Camera, CameraImage, CameraTopics, Pinhole
 from modular_framework_simulation.sensors.renderer import Drawing, Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneTracker
+from modular_framework_testing.simulation.simulated_samples import solid
 from modular_framework_urdf.rotations import rotate_vector
 
 LOOKING_DOWN = (1.0, 0.0, 0.0, 0.0)

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from simulated_samples import lift_robot_urdf, solid
 
 from modular_framework_simulation.errors import AmbiguousNameError, ModelChangeError, UnknownEntityError
 from modular_framework_simulation.loop.pacing import Pacer
@@ -35,6 +34,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import WORLD_FRAMES, PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, JointSettings, Twist, cross
+from modular_framework_testing.simulation.simulated_samples import lift_robot_urdf, solid
 
 NOWHERE = (0.0, 0.0, 0.0)
 CUBE = specs.Box((0.05, 0.05, 0.05))

@@ -9,8 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from law_trials import bounce_box, heavy_on_light, roll_ball, roll_cylinder, top
-from simulated_samples import jointed, lift_robot_urdf, run, solid
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -22,6 +20,8 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_testing.simulation.law_trials import bounce_box, heavy_on_light, roll_ball, roll_cylinder, top
+from modular_framework_testing.simulation.simulated_samples import jointed, lift_robot_urdf, run, solid
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))

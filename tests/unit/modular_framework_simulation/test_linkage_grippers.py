@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from simulated_samples import solid
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
@@ -20,6 +19,7 @@ from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
+from modular_framework_testing.simulation.simulated_samples import solid
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from linkage_hands import four_bar_parts  # noqa: E402

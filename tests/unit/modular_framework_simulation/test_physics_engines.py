@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from simulated_samples import exact_state, jointed, lift_robot_urdf, run, solid
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -22,6 +21,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist
+from modular_framework_testing.simulation.simulated_samples import exact_state, jointed, lift_robot_urdf, run, solid
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))

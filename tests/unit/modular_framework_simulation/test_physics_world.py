@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import trimesh
-from simulated_samples import exact_state, run, solid
 
 from modular_framework_simulation.errors import DescriptionError, DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -20,6 +19,7 @@ from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.urdf_model import read_urdf_model
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_testing.simulation.simulated_samples import exact_state, run, solid
 
 CUBE = specs.Box((0.05, 0.05, 0.05))
 

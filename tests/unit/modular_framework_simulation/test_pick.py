@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from simulated_samples import solid
 from xacro_rospkg import expand
 
 from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
@@ -24,6 +23,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_testing.simulation.simulated_samples import solid
 
 ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
 START = dict(zip(ARM, (1.57, -1.57, 1.57, -1.57, -1.57, 0.0), strict=True))

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from simulated_samples import solid
 
 from modular_framework_simulation.loop.referee import MAX_INTERVENTIONS, Referee
 from modular_framework_simulation.models import sdf_specs as specs
@@ -14,6 +13,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_testing.simulation.simulated_samples import solid
 
 CUBE = specs.Box((0.05, 0.05, 0.05))
 LOOK_STEPS = 10

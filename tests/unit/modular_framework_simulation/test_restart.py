@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from simulated_samples import exact_state, lift_robot_urdf, solid
 
 from modular_framework_simulation.loop.snapshots import take_snapshot
 from modular_framework_simulation.loop.world_digest import WorldDigest
@@ -16,6 +15,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_testing.simulation.simulated_samples import exact_state, lift_robot_urdf, solid
 
 CUBE = solid("cube", specs.Box((0.05, 0.05, 0.05)), Pose((0.0, 0.0, 0.2)))
 BALL = solid("ball", specs.Sphere(0.03), Pose((0.01, 0.005, 0.4)))

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from simulated_samples import exact_state, lift_robot_urdf, solid
 
 from modular_framework_control.hardware_interface.interfaces import (
     ControllerInfo,
@@ -35,6 +34,7 @@ from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody, Role
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_testing.simulation.simulated_samples import exact_state, lift_robot_urdf, solid
 
 Script = Callable[[float], None]
 EVERY_ENGINE = pytest.mark.parametrize("engine", ENGINES)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from simulated_samples import run, solid
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
@@ -33,6 +32,7 @@ from modular_framework_simulation.sensors.laser import Laser, LaserSensor
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
 from modular_framework_simulation.sensors.ray_scene import RayScene
 from modular_framework_simulation.sensors.sensor_reader import Sensors, read_model_sensors
+from modular_framework_testing.simulation.simulated_samples import run, solid
 
 GRAVITY = 9.81
 MASS = 2.0

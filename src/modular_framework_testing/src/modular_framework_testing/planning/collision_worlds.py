@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Worlds of every kind of shape around the robot, which holds an object; verdicts on random states in them."""
+"""Random worlds with all kinds of shapes, and verdicts of two collision checkers on states and motions in them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import astuple, dataclass
 import numpy as np
 import pinocchio as pin
 import trimesh
-from independent_checker import IndependentChecker, Part, Solid, box, cone, cylinder, mesh, sampled, sphere
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh, Shape, Sphere
@@ -19,6 +18,17 @@ from modular_framework_planning.planning_scene.planning_scene import (
     empty_scene,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_testing.planning.independent_checker import (
+    IndependentChecker,
+    Part,
+    Solid,
+    box,
+    cone,
+    cylinder,
+    mesh,
+    sampled,
+    sphere,
+)
 
 TIP = "wrist_3_link"
 NEAR = 0.002  # [m]; nearer than that a free state may be refused
@@ -27,7 +37,15 @@ FINEST, DENSE = 4.0e-5, 4.0e-3  # [rad or m]; between samples of the checked edg
 
 @dataclass(frozen=True)
 class Verdicts:
-    """How many states or motions were looked at, and what was said of them."""
+    """Numbers of examined states or motions, by verdict.
+
+    Attributes:
+        asked: All.
+        free: Called free.
+        touching_called_free: Called free, but in collision for the second checker.
+        refused_though_apart: Refused, but all bodies are more than `NEAR` apart.
+        refused_within_2_mm: Refused, with bodies at most `NEAR` apart.
+    """
 
     asked: int = 0
     free: int = 0
@@ -40,7 +58,12 @@ class Verdicts:
 
 
 def shape_of(kind: int, size: np.ndarray) -> tuple[Shape, Solid]:
-    """A shape, and the same as FCL's geometry."""
+    """Returns a shape, for the planner and for the second checker.
+
+    Args:
+        kind: 0 to 4: box, cylinder, sphere, cone, ring as a mesh.
+        size: Edge lengths of the box around the shape [m].
+    """
     x, y, z = size.tolist()
     if kind == 0:
         return Box(x, y, z), box(x, y, z)
@@ -56,13 +79,21 @@ def shape_of(kind: int, size: np.ndarray) -> tuple[Shape, Solid]:
 
 
 def random_pose(rng: np.random.Generator) -> pin.SE3:
+    """Returns a pose 0.3 to 0.9 m from the vertical axis of the robot, with any orientation."""
     angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.3, 0.9)
     turn = pin.Quaternion(*(lambda q: q / np.linalg.norm(q))(rng.normal(size=4))).toRotationMatrix()
     return pin.SE3(turn, np.array([distance * np.cos(angle), distance * np.sin(angle), rng.uniform(0.8, 1.8)]))
 
 
 def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, held: int) -> PlanningScene:
-    """Ten shapes of all kinds around the robot and one held object, for both checkers."""
+    """Puts ten shapes of all kinds around the robot and one into its hand, for both checkers.
+
+    Args:
+        model: Robot.
+        second: Second checker of the robot; gets the same shapes.
+        rng: Random generator of the world.
+        held: Kind of the held shape, see `shape_of`.
+    """
     scene, world = empty_scene(model), []
     for number in range(10):
         shape, solid = shape_of(number % 5, rng.uniform(0.17, 0.3, 3))  # nothing fits inside a link
@@ -89,11 +120,18 @@ def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Gen
 
 
 def random_state(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
+    """Returns positions of all joints, each within its limits and at most pi from zero."""
     return model.with_mimics(rng.uniform(np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)))
 
 
 def verdict(ours: ExactCollisionChecker, second: IndependentChecker, positions: np.ndarray) -> Verdicts:
-    """What both checkers say of one state."""
+    """Compares the verdicts of both checkers on a state.
+
+    Args:
+        ours: Checker of the planner.
+        second: Second checker.
+        positions: Positions of all joints.
+    """
     values = dict(zip(ours.model.joint_names, positions.tolist(), strict=True))
     free, touching = ours.is_free(positions), bool(second.collisions(values))
     refused = not free and not touching
@@ -106,7 +144,9 @@ class Comparison:
     """Both checkers in one world.
 
     Attributes:
-        moving: indices of the joints that get random values; the others stay at their defaults.
+        ours: Checker of the planner.
+        second: Second checker.
+        moving: Indices of the joints with random values; the others stay at their defaults.
     """
 
     ours: ExactCollisionChecker
@@ -114,18 +154,18 @@ class Comparison:
     moving: np.ndarray
 
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
-        """A state with random values of the joints that move."""
+        """Returns a state with random values of the moving joints."""
         model = self.ours.model
         positions = model.default_positions()
         positions[self.moving] = random_state(model, rng)[self.moving]
         return model.with_mimics(positions)
 
     def states(self, rng: np.random.Generator, count: int) -> Verdicts:
-        """What is said of random states."""
+        """Returns the verdicts on random states."""
         return sum((verdict(self.ours, self.second, self.random_state(rng)) for _ in range(count)), Verdicts())
 
     def edges(self, rng: np.random.Generator, count: int) -> Verdicts:
-        """What is said of random straight motions, most of them from free states."""
+        """Returns the verdicts on random straight motions, most of them from free states."""
         model, total = self.ours.model, Verdicts()
         for number in range(count):
             start = self.random_state(rng)
@@ -153,7 +193,7 @@ class Comparison:
 
 
 def compared_in(scene: PlanningScene, second: IndependentChecker) -> Comparison:
-    """Both checkers in a scene in which all joints move but those of a base."""
+    """Compares both checkers in a scene; all joints move except those of a base."""
     moving = np.setdiff1d(np.arange(len(scene.model.joint_names)), scene.model.base_indices)
     return Comparison(ExactCollisionChecker(scene, moving), second, moving)
 
@@ -161,9 +201,15 @@ def compared_in(scene: PlanningScene, second: IndependentChecker) -> Comparison:
 def compared_around(
     model: RobotModel, second: IndependentChecker, rng: np.random.Generator, moving: np.ndarray
 ) -> Comparison:
-    """Both checkers among ten shapes of all kinds where the links that move most can be, when some joints move.
+    """Compares both checkers among ten shapes of all kinds, within reach of the links that move most.
 
-    Pairs of bodies that these joints do not move against each other are left out, as the first checker leaves them out.
+    Pairs of bodies without relative motion are left out, as by the checker of the planner.
+
+    Args:
+        model: Robot.
+        second: Second checker of the robot; gets the same shapes.
+        rng: Random generator of the world.
+        moving: Indices of the joints that move.
     """
     scene, world = empty_scene(model), []
     home = Comparison(ExactCollisionChecker(scene, moving), second, moving)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One SIGINT during a simulated pick: when the task printed its last line, when the arm was at rest, what was left."""
+"""Measures one SIGINT during a simulated pick: end of the task, rest of the arm, remaining processes."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ os._exit(0)
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """What one Ctrl-C did.
+    """The effect of one Ctrl-C.
 
     Attributes:
-        moment_s: When it was pressed, from the text that was waited for [s].
-        state: State that ran.
-        speed: Fastest joint of the arm then [rad/s].
-        last_word_s: From the signal to the task's last line [s].
-        outcome: That line.
-        rest_s: From the signal to the first message after which no joint of the arm moved any more [s].
-        last_speed: Fastest joint of the arm in the last message of the joints [rad/s].
-        launch_s: From the signal to the end of the launch [s].
-        slow: What roslaunch said about nodes that did not end when they were asked to.
-        left: Processes of the launch that were there after it, as command lines.
+        moment_s: Time from the awaited text to the signal [s].
+        state: Running state.
+        speed: Speed of the fastest joint of the arm at the signal [rad/s].
+        last_word_s: Time from the signal to the last line of the task [s].
+        outcome: Last line of the task.
+        rest_s: Time from the signal to the last message with a moving joint of the arm [s].
+        last_speed: Speed of the fastest joint of the arm in the last message [rad/s].
+        launch_s: Time from the signal to the end of the launch [s].
+        slow: Lines of roslaunch about nodes that had to be killed.
+        left: Command lines of the processes that the launch left behind.
     """
 
     moment_s: float
@@ -69,7 +69,7 @@ class Stop:
     left: tuple[str, ...]
 
     def faults(self) -> list[str]:
-        """Says what is not as it should be; nothing when all is."""
+        """Returns the violated requirements."""
         return [
             text
             for wrong, text in (
@@ -84,20 +84,20 @@ class Stop:
         ]
 
     def figures(self) -> dict[str, Any]:
-        """Returns all as a mapping, for JSON."""
+        """Returns the attributes and the faults, for JSON."""
         return asdict(self) | {"faults": self.faults()}
 
 
 def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motion: bool = False) -> Stop | None:
-    """Starts the framework and presses Ctrl-C some time [s] after a text in its log.
+    """Starts the framework, and sends SIGINT some time after a text in its log.
 
     Args:
-        moment_s: That time.
-        after: That text.
-        in_motion: Whether the time begins only when the arm moves as well, which a busy machine may be slow to do.
+        moment_s: Time from the text to the signal [s].
+        after: Text in the log.
+        in_motion: Whether the time begins only when the arm also moves, which may be late on a busy computer.
 
     Returns:
-        What that did; None when the task had ended before, or ended by itself as the keys were pressed.
+        The effect; None if the task ended before the signal, or by itself at the signal.
     """
     session = RosSession()
     session.env.pop("DISPLAY", None)
@@ -122,7 +122,8 @@ def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motio
         launch_s = time.monotonic() - pressed
         if last_word_s < BY_ITSELF_S and "SUCCEEDED" in launch.log():
             return None
-        return _stop(moment_s, launch.log(), pressed, last_word_s, launch_s, speeds, _left(session, watcher.pid))
+        samples = _samples(speeds, pressed)
+        return _stop(moment_s, launch.log(), samples, last_word_s, launch_s, left=_left(session, watcher.pid))
     finally:
         watcher.kill()
         watcher.wait()
@@ -130,20 +131,27 @@ def stop_a_pick(moment_s: float, after: str = "first state running", *, in_motio
 
 
 def _print_failure(log: str) -> None:
-    """Prints why a pick had ended before its moment, unless it had succeeded: that is worth a look, too."""
+    """Prints why a pick ended before the signal, unless it succeeded."""
     if "SUCCEEDED" not in log:
         reasons = [line for line in log.splitlines() if line.startswith(("Task ", "  "))] or log.splitlines()[-20:]
         print("a pick failed by itself:", *reasons, sep="\n", file=sys.stderr, flush=True)
 
 
+def _samples(speeds: Path, pressed: float) -> list[tuple[float, float]]:
+    """Returns the times since the signal [s], and the speed of the fastest joint at each of them [rad/s]."""
+    rows = [line.split() for line in speeds.read_text().splitlines()]
+    return [(float(row[0]) - pressed, float(row[1])) for row in rows if len(row) == 2]
+
+
 def _stop(
-    moment_s: float, log: str, pressed: float, last_word_s: float, launch_s: float, speeds: Path, left: tuple[str, ...]
+    moment_s: float,
+    log: str,
+    samples: list[tuple[float, float]],
+    last_word_s: float,
+    launch_s: float,
+    *,
+    left: tuple[str, ...],
 ) -> Stop:
-    samples = [
-        (float(line.split()[0]) - pressed, float(line.split()[1]))
-        for line in speeds.read_text().splitlines()
-        if len(line.split()) == 2
-    ]
     moving = [time_s for time_s, speed in samples if speed > AT_REST_RAD_S and time_s > 0.0]
     last_word = next(line for line in log.splitlines() if LAST_WORD in line)
     running = [line.split("'")[5] for line in log.splitlines() if "state machine goes from" in line]
@@ -166,7 +174,7 @@ def _speed_at(samples: list[tuple[float, float]], time_s: float) -> float:
 
 
 def _until(launch: Launch, text: str, timeout_s: float) -> float:
-    """Waits until a launch prints a text; returns when it was seen [s, monotonic]."""
+    """Waits until a launch prints a text; returns the time of this moment [s, monotonic]."""
     end = time.monotonic() + timeout_s
     while text not in launch.log():
         assert time.monotonic() < end, f"'{text}' was not printed in {timeout_s} s:\n{launch.log()}"
@@ -176,7 +184,7 @@ def _until(launch: Launch, text: str, timeout_s: float) -> float:
 
 
 def _until_it_moves(launch: Launch, speeds: Path) -> None:
-    """Waits until the arm was last seen moving."""
+    """Waits until the arm moves."""
     end = time.monotonic() + START_TIMEOUT_S
     while not [
         line
@@ -188,7 +196,7 @@ def _until_it_moves(launch: Launch, speeds: Path) -> None:
 
 
 def _left(session: RosSession, watcher: int) -> tuple[str, ...]:
-    """Returns the processes that know the session's master, but for the watcher: what the launch left behind."""
+    """Returns the command lines of the remaining processes of the session, without the watcher."""
     mark = f"ROS_MASTER_URI={session.env['ROS_MASTER_URI']}".encode()
     found = []
     for folder in Path("/proc").iterdir():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models and a two-finger robot small enough for tests."""
+"""Small models and a robot with two fingers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FINGER = """
 
 
 def lift_robot_urdf(lift_interface: str = "hardware_interface/PositionJointInterface") -> str:
-    """A palm on a vertical slide with two fingers that close along x."""
+    """Returns the URDF of a palm on a vertical slide, with two fingers that close along x."""
     one = FINGER.format(number=1, x=-0.06, axis=1, mimic="")
     two = FINGER.format(number=2, x=0.06, axis=-1, mimic='<mimic joint="slide_1" multiplier="1" offset="0"/>')
     return LIFT_ROBOT.format(fingers=one + two, lift_interface=lift_interface)
@@ -47,10 +47,20 @@ def solid(
     geometry: specs.Geometry,
     pose: Pose,
     mass: float = 0.2,
+    *,
     static: bool = False,
     surface: specs.Collision | None = None,
 ) -> specs.Model:
-    """A model of one link called "link" with one shape; `surface` says how it slides and bounces."""
+    """Returns a model with one link, called `link`, with one shape.
+
+    Args:
+        name: Name of the model.
+        geometry: Shape.
+        pose: Pose in the world.
+        mass: Mass [kg].
+        static: Whether the model never moves.
+        surface: Collision with the friction and restitution of the shape; None for a friction coefficient of 0.8.
+    """
     like = surface or specs.Collision("shape", Pose(), geometry, specs.Friction(0.8))
     collision = replace(like, geometry=geometry)
     moment = mass * 0.05**2 / 6
@@ -64,7 +74,14 @@ def jointed(
     dynamics: specs.JointDynamics = specs.JointDynamics(),  # noqa: B008  (frozen)
     pose: Pose = Pose(),  # noqa: B008
 ) -> specs.Model:
-    """A bob of 0.5 kg and 0.001 kg m^2 at the end of a bar along x, turning about y on a hinge in the world."""
+    """Returns a bob of 0.5 kg and 0.001 kg m^2 at the end of a bar along x, on a hinge about y in the world.
+
+    Args:
+        name: Name of the model.
+        length: Length of the bar [m].
+        dynamics: Friction, damping and spring of the hinge.
+        pose: Pose of the hinge in the world.
+    """
     inertial = specs.Inertial(Pose(), 0.5, (0.001, 0, 0, 0.001, 0, 0.001))
     bob = specs.Link("bob", Pose((length, 0, 0)), inertial, (), ())
     hinge = specs.Joint(
@@ -82,7 +99,7 @@ def jointed(
 
 
 def run(world: PhysicsWorld, seconds: float) -> None:
-    """Lets simulated time pass."""
+    """Simulates for some seconds."""
     for _ in range(round(seconds / world.settings.time_step_s)):
         world.step()
 

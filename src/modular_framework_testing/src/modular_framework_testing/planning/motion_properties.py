@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Random problems for each planning pipeline, and what every returned motion must be true of."""
+"""Random problems for each planning pipeline, and the required properties of every motion."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
-from independent_checker import IndependentChecker
-from independent_checker import box as solid_box
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import JointConstraint
@@ -32,6 +30,8 @@ from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeli
 from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_testing.planning.independent_checker import IndependentChecker, Solid
+from modular_framework_testing.planning.independent_checker import box as solid_box
 
 GROUP, TIP = "arm_and_manipulator", "eg_manipulator"
 BOXES = 6
@@ -45,16 +45,16 @@ CARTESIAN_LIMITS = {"max_trans_vel": 0.5, "max_trans_acc": 1.0, "max_trans_dec":
 
 @dataclass(frozen=True)
 class Problem:
-    """A request, the world for the second checker, and the goal: joint positions or a pose."""
+    """A request, its world for the second checker, and its goal: joint positions, or a pose of the tip."""
 
     request: PlanningRequest
-    world: list[tuple[object, ...]]
+    world: list[tuple[str, Solid, np.ndarray]]
     goal: np.ndarray | pin.SE3
 
 
 @dataclass
 class Tally:
-    """What a pipeline made of some problems: motions, motions that lack a property, and refusals by their code."""
+    """Results of a pipeline: number of motions, violated properties, and refusals by error code."""
 
     solved: int = 0
     violations: list[str] = field(default_factory=list)
@@ -66,7 +66,13 @@ class Tally:
 
 
 def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
-    """The pipeline a problem of a kind is given to."""
+    """Returns the planning pipeline of a kind of problems.
+
+    Args:
+        model: Robot.
+        kind: A key of `PLANNERS`.
+        seed: Seed of the pipeline.
+    """
     settings = PipelineSettings(seed=seed, robot_planning={"cartesian_limits": CARTESIAN_LIMITS})
     planner = {"ompl": OmplPlanner, "stomp": StompPlanner}.get(kind, CommandPlanner)
     adapters = () if kind in ("ptp", "lin") else make_adapters()
@@ -74,7 +80,7 @@ def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
     return PlanningPipeline(KinematicsPool(model), settings, made, adapters=adapters)
 
 
-def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, list[tuple[object, ...]]]:
+def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, list[tuple[str, Solid, np.ndarray]]]:
     scene, world = empty_scene(model), []
     for number in range(BOXES):
         angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.45, 0.9)
@@ -88,7 +94,7 @@ def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, 
 def _free_state(
     model: RobotModel, checker: ExactCollisionChecker, rng: np.random.Generator, near: np.ndarray | None = None
 ) -> np.ndarray:
-    """A free state: anywhere, or with each joint at most LINE_TURNS from another state."""
+    """Returns a free state: any, or with each joint at most LINE_TURNS from another state."""
     indices = model.group(GROUP).indices
     positions = model.default_positions()
     while True:
@@ -100,9 +106,15 @@ def _free_state(
 
 
 def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Problem]:
-    """Random worlds, starts and goals; every second one has a path constraint (but for lines, which give their own).
+    """Yields problems with random worlds, starts and goals; every second one has a path constraint, lines excepted.
 
-    The goal of a line is the tip's pose in a state near the start, so that it can be reached.
+    The goal of a line is the pose of the tip in a state near the start, so that the goal can be reached.
+
+    Args:
+        model: Robot.
+        kind: A key of `PLANNERS`.
+        count: Number of problems.
+        seed: Seed of the problems.
     """
     rng = np.random.default_rng([seed, sorted(PLANNERS).index(kind)])
     indices = model.group(GROUP).indices
@@ -114,7 +126,7 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
         constraints = None
         if kind == "lin":
             goal = model.link_transforms(end)[TIP]
-            asked = PoseGoal(TIP, goal)
+            asked: PoseGoal | JointGoal = PoseGoal(TIP, goal)
         else:
             goal = end[indices]
             asked = JointGoal(dict(zip(model.group(GROUP).joints, goal.tolist(), strict=True)))
@@ -153,9 +165,16 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
 def violations(
     model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer, scaling: float
 ) -> list[str]:
-    """Properties the motion lacks, looked at on the curve of a controller, at 1 ms samples.
+    """Returns the properties that a motion lacks, on the curve of a controller sampled every 1 ms.
 
-    Joints' limits count with the factor `scaling`, collisions along the curve and straight from point to point.
+    Collisions are sought along the curve and along the straight lines between the points.
+
+    Args:
+        model: Robot.
+        checker: Second checker; gets the world of the problem.
+        problem: Problem.
+        answer: Response with the motion.
+        scaling: Allowed fraction of the joints' velocity and acceleration limits.
     """
     motion, indices = answer.trajectory, model.group(GROUP).indices
     faults = []
@@ -202,9 +221,9 @@ def _goal_faults(model: RobotModel, problem: Problem, end: np.ndarray) -> list[s
 
 
 def _groundless(model: RobotModel, checker: IndependentChecker, problem: Problem, kind: str) -> list[str]:
-    """What is wrong with a refusal: the straight motion a point-to-point command asks for has to touch something.
+    """Returns the fault of a refusal: the straight motion of a point-to-point command must be in collision.
 
-    It keeps the path constraints by the way these are drawn.
+    The path constraints hold along this motion, by the way they are drawn.
     """
     if kind != "ptp":
         return []
@@ -219,7 +238,15 @@ def _groundless(model: RobotModel, checker: IndependentChecker, problem: Problem
 
 
 def examine(model: RobotModel, checker: IndependentChecker, kind: str, count: int, seed: int = 1) -> Tally:
-    """Plans random problems and collects what is wrong with the motions and the refusals."""
+    """Plans random problems and collects the faults of motions and refusals.
+
+    Args:
+        model: Robot.
+        checker: Second checker of the robot.
+        kind: A key of `PLANNERS`.
+        count: Number of problems.
+        seed: Seed of problems and pipeline.
+    """
     pipeline, tally = make_pipeline(model, kind, seed), Tally()
     for number, problem in enumerate(problems(model, kind, count, seed)):
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two arms whose forward kinematics is written down anew here, sharing no code with the planner.
+"""Two arms with a forward kinematics that shares no code with the planner.
 
 The UR5's Denavit-Hartenberg lengths and the joint frames of the seven-joint arm (those of a Franka Panda) are public.
 """

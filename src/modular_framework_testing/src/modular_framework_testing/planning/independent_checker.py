@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A second opinion on collisions: own forward kinematics of many states at once, one FCL call per pair of bodies.
+"""A second collision checker: its own forward kinematics of many states at once, one FCL call per pair of bodies.
 
 Of the planner it shares the reader of mesh files only. Pairs are left out where a sphere around one body does not reach
 the box around the other.
@@ -21,7 +21,7 @@ STATES_AT_ONCE = 500
 
 @dataclass
 class Solid:
-    """FCL's geometry, and its bounding box in its own frame: middle and half lengths."""
+    """A geometry of FCL, and its bounding box in the frame of the geometry: half lengths and centre [m]."""
 
     geometry: object
     half: np.ndarray
@@ -30,7 +30,7 @@ class Solid:
 
 @dataclass
 class Part:
-    """One collision geometry: body, link it hangs on ("" = world), pose there, geometry."""
+    """A collision geometry: body, parent link ("" for the world), pose in the link, geometry."""
 
     body: str
     link: str
@@ -39,27 +39,33 @@ class Part:
 
 
 def box(x: float, y: float, z: float) -> Solid:
-    """A box by its edges."""
+    """Returns a box.
+
+    Args:
+        x: Edge length along x [m].
+        y: Edge length along y [m].
+        z: Edge length along z [m].
+    """
     return Solid(fcl.Box(x, y, z), np.array([x, y, z]) / 2.0, np.zeros(3))
 
 
 def sphere(radius: float) -> Solid:
-    """A sphere."""
+    """Returns a sphere."""
     return Solid(fcl.Sphere(radius), np.full(3, radius), np.zeros(3))
 
 
 def cylinder(radius: float, height: float) -> Solid:
-    """A cylinder along z."""
+    """Returns a cylinder along z."""
     return Solid(fcl.Cylinder(radius, height), np.array([radius, radius, height / 2.0]), np.zeros(3))
 
 
 def cone(radius: float, height: float) -> Solid:
-    """A cone along z."""
+    """Returns a cone along z."""
     return Solid(fcl.Cone(radius, height), np.array([radius, radius, height / 2.0]), np.zeros(3))
 
 
 def mesh(vertices: np.ndarray, triangles: np.ndarray) -> Solid:
-    """A triangle mesh."""
+    """Returns a triangle mesh."""
     model = fcl.BVHModel()
     model.beginModel(len(vertices), len(triangles))
     model.addSubModel(np.asarray(vertices, float), np.asarray(triangles, np.int32))
@@ -69,29 +75,78 @@ def mesh(vertices: np.ndarray, triangles: np.ndarray) -> Solid:
 
 
 def pose_matrix(xyz: Sequence[float], rotation: np.ndarray) -> np.ndarray:
-    """Homogeneous transform."""
+    """Returns a homogeneous transform."""
     result = np.eye(4)
     result[:3, :3], result[:3, 3] = rotation, xyz
     return result
 
 
 def rpy_matrix(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Rotation about fixed x, then y, then z."""
+    """Returns the rotation about the fixed axes x, then y, then z.
+
+    Args:
+        roll: Angle about x [rad].
+        pitch: Angle about y [rad].
+        yaw: Angle about z [rad].
+    """
     return axis_matrix([0, 0, 1], yaw) @ axis_matrix([0, 1, 0], pitch) @ axis_matrix([1, 0, 0], roll)
 
 
 def axis_matrix(axis: Sequence[float], angle: float) -> np.ndarray:
-    """Rodrigues' formula."""
+    """Returns the rotation about an axis, by Rodrigues' formula."""
     x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def quaternion_matrix(x: float, y: float, z: float, w: float) -> np.ndarray:
-    """Rotation of an xyzw quaternion."""
+    """Returns the rotation of a quaternion of any length.
+
+    Args:
+        x: Component x.
+        y: Component y.
+        z: Component z.
+        w: Component w.
+    """
     norm = np.sqrt(x * x + y * y + z * z + w * w)
     angle = 2 * np.arctan2(np.sqrt(x * x + y * y + z * z) / norm, w / norm)
     return np.eye(3) if abs(angle) < 1e-12 else axis_matrix([x, y, z], angle)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint: name, type, parent link, pose in the parent, axis, and the (joint, multiplier, offset) it mimics."""
+
+    name: str
+    kind: str
+    parent: str
+    origin: np.ndarray
+    axis: Sequence[float]
+    mimic: tuple[str, float, float] | None = None
+
+
+def _text(element: ET.Element, key: str) -> str:
+    """Returns an attribute that the formats require."""
+    return element.attrib[key]
+
+
+def _child(element: ET.Element, name: str) -> ET.Element:
+    """Returns a child element that the formats require."""
+    return next(element.iter(name))
+
+
+def _joint(element: ET.Element) -> _Joint:
+    mimic = element.find("mimic")
+    return _Joint(
+        _text(element, "name"),
+        _text(element, "type"),
+        _text(_child(element, "parent"), "link"),
+        _origin(element),
+        _floats(element.find("axis"), "xyz", "1 0 0"),
+        None
+        if mimic is None
+        else (_text(mimic, "joint"), float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))),
+    )
 
 
 def _floats(element: ET.Element | None, key: str, default: str) -> list[float]:
@@ -105,7 +160,7 @@ def _origin(element: ET.Element) -> np.ndarray:
 
 
 def _motion(kind: str, axis: Sequence[float], values: np.ndarray) -> np.ndarray:
-    """What a joint does at each of its values, shape (..., 4, 4)."""
+    """Returns the transform of a joint at each of its values, shape (..., 4, 4)."""
     result = np.zeros((*values.shape, 4, 4)) + np.eye(4)
     if kind in ("revolute", "continuous"):
         x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
@@ -121,31 +176,18 @@ World = Iterable[tuple[str, Solid, np.ndarray]]
 
 
 class IndependentChecker:
-    """The robot of a URDF and SRDF, and boxes and cylinders around it."""
+    """Collision checks of the robot of a URDF and an SRDF, and of solids around it."""
 
     def __init__(self, urdf: str, srdf: str, resolve: Callable[[str], str]) -> None:
         root, semantics = ET.fromstring(urdf), ET.fromstring(srdf)
-        self._joints = {}
-        for joint in root.findall("joint"):
-            axis = _floats(joint.find("axis"), "xyz", "1 0 0")
-            mimic = joint.find("mimic")
-            self._joints[joint.find("child").get("link")] = (
-                joint.get("name"),
-                joint.get("type"),
-                joint.find("parent").get("link"),
-                _origin(joint),
-                axis,
-                None
-                if mimic is None
-                else (mimic.get("joint"), float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))),
-            )
-        self._links = [link.get("name") for link in root.findall("link")]
+        self._joints = {_text(_child(joint, "child"), "link"): _joint(joint) for joint in root.findall("joint")}
+        self._links = [_text(link, "name") for link in root.findall("link")]
         self._add_base(semantics)
         self.parts: list[Part] = []
         for link in root.findall("link"):
             for collision in link.findall("collision"):
-                name = link.get("name")
-                self.parts.append(Part(name, name, _origin(collision), self._read(collision.find("geometry"), resolve)))
+                name, geometry = _text(link, "name"), _child(collision, "geometry")
+                self.parts.append(Part(name, name, _origin(collision), self._read(geometry, resolve)))
         self._allowed = {frozenset((e.get("link1"), e.get("link2"))) for e in semantics.iter("disable_collisions")}
         self._robot_parts = len(self.parts)
         self.pairs = self._robot_pairs()
@@ -167,7 +209,7 @@ class IndependentChecker:
                 motion = "prismatic" if variable in slides[kind] else "continuous"
                 axis = axes[variable.removeprefix("trans_")]
                 parent = f"{name}/{variables[number - 1]}" if number else ""
-                self._joints[child] = (f"{name}/{variable}", motion, parent, np.eye(4), axis, None)
+                self._joints[child] = _Joint(f"{name}/{variable}", motion, parent, np.eye(4), axis)
                 child = parent
             break
 
@@ -175,17 +217,18 @@ class IndependentChecker:
     def _read(geometry: ET.Element, resolve: Callable[[str], str]) -> Solid:
         shape = geometry[0]
         if shape.tag == "mesh":
-            read = read_mesh(resolve(shape.get("filename")), tuple(_floats(shape, "scale", "1 1 1")))
+            x, y, z = _floats(shape, "scale", "1 1 1")
+            read = read_mesh(resolve(_text(shape, "filename")), (x, y, z))
             return mesh(read.vertices, read.triangles)
         if shape.tag == "box":
             return box(*_floats(shape, "size", ""))
         if shape.tag == "sphere":
-            return sphere(float(shape.get("radius")))
-        return cylinder(float(shape.get("radius")), float(shape.get("length")))
+            return sphere(float(_text(shape, "radius")))
+        return cylinder(float(_text(shape, "radius")), float(_text(shape, "length")))
 
     def _moving_root(self, link: str) -> str:
-        while link in self._joints and self._joints[link][1] == "fixed":
-            link = self._joints[link][2]
+        while link in self._joints and self._joints[link].kind == "fixed":
+            link = self._joints[link].parent
         return link
 
     def _robot_pairs(self) -> list[tuple[int, int]]:
@@ -223,11 +266,13 @@ class IndependentChecker:
                 if link not in self._joints:
                     poses[link] = poses[""]
                     return poses[link]
-                name, kind, parent, origin, axis, mimic = self._joints[link]
-                value = positions.get(name, 0.0)
-                if mimic is not None and name not in positions:
-                    value = mimic[1] * positions.get(mimic[0], 0.0) + mimic[2]
-                poses[link] = pose(parent) @ origin @ _motion(kind, axis, np.asarray(value, float))
+                joint = self._joints[link]
+                value = positions.get(joint.name, 0.0)
+                if joint.mimic is not None and joint.name not in positions:
+                    leader, multiplier, offset = joint.mimic
+                    value = multiplier * positions.get(leader, 0.0) + offset
+                motion = _motion(joint.kind, joint.axis, np.asarray(value, float))
+                poses[link] = pose(joint.parent) @ joint.origin @ motion
             return poses[link]
 
         for link in self._links:
@@ -283,7 +328,7 @@ class IndependentChecker:
         return float(best)
 
     def depths(self, positions: Mapping[str, float], bodies: tuple[str, str]) -> list[float]:
-        """How deep FCL says the parts of two bodies are in each other in one state, one entry a contact [m]."""
+        """Returns the penetration depth of each contact of two bodies in a state [m]."""
         poses = self._part_poses(positions, 1)[0]
         result = fcl.CollisionResult()
         for pair in self.pairs:
@@ -298,7 +343,16 @@ class IndependentChecker:
     def touching_pairs(
         self, joint_names: Sequence[str], samples: np.ndarray, rest: Mapping[str, float]
     ) -> dict[int, tuple[str, str]]:
-        """The first pair of bodies that touches, for each of many states (n, joints) in which one does."""
+        """Finds the colliding states.
+
+        Args:
+            joint_names: Names of the joints in the columns of `samples`.
+            samples: States, shape (n, joints).
+            rest: Positions of the other joints, by name.
+
+        Returns:
+            Index of each colliding state -> the first pair of colliding bodies.
+        """
         found: dict[int, tuple[str, str]] = {}
         for begin in range(0, len(samples), STATES_AT_ONCE):
             some = samples[begin : begin + STATES_AT_ONCE]
@@ -311,12 +365,19 @@ class IndependentChecker:
     def colliding_states(
         self, joint_names: Sequence[str], path: np.ndarray, rest: Mapping[str, float], step: float = 0.01
     ) -> int:
-        """Counts colliding states on the straight pieces of a path, sampled at most `step` apart in every joint."""
+        """Counts the colliding states along a path.
+
+        Args:
+            joint_names: Names of the joints in the columns of `path`.
+            path: Vertices, shape (n, joints).
+            rest: Positions of the other joints, by name.
+            step: Maximum difference of a joint between samples [rad or m].
+        """
         return len(self.touching_pairs(joint_names, sampled(path, step), rest))
 
 
 def sampled(path: np.ndarray, step: float) -> np.ndarray:
-    """States on the straight pieces of a path, at most `step` apart in every joint, the vertices among them."""
+    """Returns states on the straight pieces of a path, vertices included, at most `step` apart in every joint."""
     rows = []
     for start, end in zip(path[:-1], path[1:], strict=True):
         pieces = max(1, int(np.ceil(np.abs(end - start).max() / step)))

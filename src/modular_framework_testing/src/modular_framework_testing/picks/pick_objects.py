@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Has the shipped task pick one object after the other in one running simulation, and prints what became of each.
+"""Has the shipped task pick one object after the other in one running simulation, and prints each result.
 
-Run as a node beside `start_framework.launch ... end_with_task:=false`: `pick_objects.py TASK_SCRIPT [CASE ...]`. Every
-line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases, all by default, are the objects of the
-standard set and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can, and
-with the other the fingers touch the can before they close.
+Run as a node beside `start_framework.launch ... end_with_task:=false`:
+
+    python3 -m modular_framework_testing.picks.pick_objects TASK_SCRIPT [CASE ...]
+
+Every line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases, all by default, are the objects
+of the standard set and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can,
+and with the other the fingers touch the can before they close.
 """
 
 from __future__ import annotations
@@ -53,7 +56,7 @@ def wait(condition: Callable[[], Any], what: str) -> None:
     """Waits for a condition in wall time.
 
     Raises:
-        TimeoutError: it did not hold in time.
+        TimeoutError: The condition does not hold within `WAIT_S`.
     """
     end = time.monotonic() + WAIT_S
     while not condition():
@@ -69,7 +72,17 @@ def service(name: str, kind: Any) -> Any:
 
 
 def spawn(name: str, model: str, xy: tuple[float, float], yaw: float) -> str:
-    """Puts a model on the table of ur5_table.world; returns why that failed, or nothing."""
+    """Puts a model on the table of ur5_table.world.
+
+    Args:
+        name: Name of the object.
+        model: A key of `OBJECTS`.
+        xy: Position on the table, in the world [m].
+        yaw: Angle about the vertical [rad].
+
+    Returns:
+        The reason of a failure, or "".
+    """
     place = service("/gazebo/spawn_sdf_model", SpawnModel)
     text = (Path(rospy.get_param("/gazebo_model_path")) / model / "model.sdf").read_text()
     pose = Pose(
@@ -80,7 +93,7 @@ def spawn(name: str, model: str, xy: tuple[float, float], yaw: float) -> str:
 
 
 def height(name: str) -> float:
-    """Returns how high a model is [m]."""
+    """Returns the height of a model [m]."""
     return float(service("/gazebo/get_model_state", GetModelState)(name, "world").pose.position.z)
 
 
@@ -97,7 +110,16 @@ class Picker:
         self._signals += 1
 
     def pick(self, case: str, model: str, task_runs: bool) -> dict[str, Any]:
-        """Has one object picked; returns what became of it."""
+        """Has the task pick an object.
+
+        Args:
+            case: Name of the case.
+            model: A key of `OBJECTS`.
+            task_runs: Whether the task of the launch file already runs; otherwise the task is started.
+
+        Returns:
+            The fields of the printed line.
+        """
         name, signals = f"{case}_1", self._signals
         problem = spawn(name, model, PLACE_XY_M, YAW_RAD)
         if problem:
@@ -127,13 +149,13 @@ class Picker:
         }
 
     def clear(self, case: str) -> None:
-        """Takes the object away, and waits until the planning scene has forgotten it."""
+        """Removes the object, and waits until it is no longer in the planning scene."""
         service("/gazebo/delete_model", DeleteModel)(f"{case}_1")
         wait(lambda: not in_scene(case), f"{case} to be gone")
 
 
 def in_scene(case: str) -> bool:
-    """Whether the object of a case is in the planning scene, attached ones included."""
+    """Returns whether the object of a case is in the planning scene or attached."""
     wanted = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
     scene = service("get_planning_scene", GetPlanningScene)(PlanningSceneComponents(components=wanted)).scene
     found = [*scene.world.collision_objects, *(item.object for item in scene.robot_state.attached_collision_objects)]
@@ -141,7 +163,7 @@ def in_scene(case: str) -> bool:
 
 
 def spoil_first_grasps() -> None:
-    """Puts two bad grasps before the ones that were generated."""
+    """Puts two bad grasps before the generated grasps."""
     get, add = service("get_grasp", GetStandardisedGrasp), service("add_grasp", AddStandardisedGrasp)
     grasps = []
     while (answer := get("")).success:
@@ -156,7 +178,7 @@ def spoil_first_grasps() -> None:
 
 
 def main() -> int:
-    """Picks all of them; returns 1 when the framework did not start."""
+    """Picks all objects; returns the exit code."""
     end = time.monotonic() + WAIT_S
     while not rosgraph.is_master_online() and time.monotonic() < end:
         time.sleep(0.1)

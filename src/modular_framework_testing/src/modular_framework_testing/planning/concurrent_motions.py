@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from moveit_msgs.msg import Constraints, JointConstraint, MotionPlanRequest
-from planning_wire import ARM, OK, START, add, box, plan, request
+
+from modular_framework_testing.planning.planning_wire import ARM, OK, START, add, box, plan, request
 
 ADAPTERS = " ".join(
     f"default_planner_request_adapters/{name}"

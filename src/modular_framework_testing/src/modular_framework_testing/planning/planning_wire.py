@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of move_group share: a robot that follows trajectories, a client's calls and messages."""
+"""A robot without hardware for move_group, and the calls and messages of a client."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ OK = MoveItErrorCodes.SUCCESS
 class FakeArm:
     """Joint states and controllers without a robot.
 
-    The arm controller jumps from point to point in the trajectory's time; the gripper controller (if asked for) is
-    where it should be at once.
+    The arm controller jumps from point to point at the times of the trajectory. The gripper controller, if requested,
+    reaches its goal at once.
     """
 
     def __init__(self, with_gripper: bool = False) -> None:
@@ -84,14 +84,14 @@ class FakeArm:
         self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
 
     def close(self) -> None:
-        """Ends its joint states and controllers, which would publish while rospy closes the topics."""
+        """Ends joint states and controllers, before rospy closes the topics."""
         self._timer.shutdown()
         self._timer.join(1.0)
         for server in self._servers:
             server.action_server.stop()
 
     def settle(self) -> None:
-        """Returns when the node knows where the robot is."""
+        """Waits until move_group knows the positions of the robot."""
 
         def is_known() -> bool:
             state = call(
@@ -103,12 +103,12 @@ class FakeArm:
         until(is_known, "the robot's position in the node")
 
     def until_moving(self, joint: str = ARM[0]) -> None:
-        """Returns when a motion has begun at the start."""
+        """Waits until the first motion from the start begins."""
         place = START[ARM.index(joint)]
         until(lambda: abs(self.positions[joint] - place) > 1e-3, "the begin of the motion")
 
     def publish(self) -> None:
-        """Publishes joint states at once."""
+        """Publishes joint states once."""
         self._publish(None)
 
     def _publish(self, _: Any) -> None:
@@ -138,11 +138,27 @@ class FakeArm:
 
 
 def call(name: str, kind: Any, *args: Any) -> Any:
+    """Waits for a service and calls it.
+
+    Args:
+        name: Name of the service.
+        kind: Type of the service.
+        *args: Fields of the request.
+    """
     rospy.wait_for_service(name, 30.0)
     return rospy.ServiceProxy(name, kind)(*args)
 
 
 def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float]) -> CollisionObject:
+    """Returns a box in the frame `world`.
+
+    Args:
+        name: Name of the object.
+        x: Centre along x [m].
+        y: Centre along y [m].
+        z: Centre along z [m].
+        size: Edge lengths [m].
+    """
     message = CollisionObject(
         id=name,
         primitives=[SolidPrimitive(SolidPrimitive.BOX, list(size))],
@@ -153,13 +169,20 @@ def box(name: str, x: float, y: float, z: float, size: tuple[float, float, float
 
 
 def add(*objects: CollisionObject) -> bool:
+    """Adds objects to the planning scene; returns whether move_group applied them."""
     scene = PlanningScene(is_diff=True)
     scene.world.collision_objects = list(objects)
     return bool(call("apply_planning_scene", ApplyPlanningScene, scene).success)
 
 
 def tip_pose(values: Any, frame: str = "world", link: str = TIP) -> Pose:
-    """Where compute_fk says a link is when the arm's joints have these values."""
+    """Returns the pose of a link by `compute_fk`.
+
+    Args:
+        values: Positions of the arm's joints [rad].
+        frame: Frame of the pose.
+        link: Name of the link.
+    """
     state = RobotState(joint_state=JointState(name=ARM, position=list(values)), is_diff=True)
     answer = call("compute_fk", GetPositionFK, Header(frame_id=frame), [link], state)
     assert answer.error_code.val == OK
@@ -167,11 +190,12 @@ def tip_pose(values: Any, frame: str = "world", link: str = TIP) -> Pose:
 
 
 def vector(pose: Pose) -> np.ndarray:
+    """Returns the position of a pose, shape (3,)."""
     return np.array([pose.position.x, pose.position.y, pose.position.z])
 
 
 def hold(item: CollisionObject, link: str = TIP) -> None:
-    """Gives the robot an object to hold; its pose counts in the link's frame."""
+    """Attaches an object to a link; the pose of the object is in the frame of the link."""
     item.header.frame_id = link
     scene = PlanningScene(is_diff=True)
     scene.robot_state.is_diff = True
@@ -180,10 +204,20 @@ def hold(item: CollisionObject, link: str = TIP) -> None:
 
 
 def table() -> CollisionObject:
+    """Returns a table in front of the arm."""
     return box("table", 0.0, 0.56, 0.82, (1.2, 0.8, 0.04))
 
 
 def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOWN, frame: str = "world") -> Constraints:
+    """Returns the goal constraints of a pose of the tip.
+
+    Args:
+        x: Position along x [m].
+        y: Position along y [m].
+        z: Position along z [m].
+        orientation: Orientation of the tip.
+        frame: Frame of the pose.
+    """
     position = PositionConstraint(link_name=TIP, weight=1.0)
     position.header.frame_id = frame
     position.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [0.001])]
@@ -194,6 +228,7 @@ def pose_constraints(x: float, y: float, z: float, orientation: Quaternion = DOW
 
 
 def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanRequest:
+    """Returns a request for the arm and the manipulator; `changes` replace fields of the message."""
     message = MotionPlanRequest(
         group_name=GROUP,
         allowed_planning_time=5.0,
@@ -208,11 +243,12 @@ def request(goal: Constraints | None = None, **changes: Any) -> MotionPlanReques
 
 
 def plan(message: MotionPlanRequest) -> Any:
+    """Returns the response to a request."""
     return call("plan_kinematic_path", GetMotionPlan, message).motion_plan_response
 
 
 class Reports:
-    """Every planning report of the module's move_group, heard by one subscriber for all tests."""
+    """All planning reports of move_group, received by one subscriber for all tests."""
 
     def __init__(self) -> None:
         self.heard: list[dict[str, Any]] = []
@@ -224,11 +260,17 @@ class Reports:
 
 @cache
 def reports() -> Reports:
+    """Returns the planning reports of move_group, received from the first call on."""
     return Reports()
 
 
 def report_of(work: Callable[[], Any], *kinds: str) -> tuple[Any, dict[str, Any]]:
-    """What the work returned and the last planning report it caused, of one of these kinds if any are named."""
+    """Returns the result of a function, and the last planning report that the function caused.
+
+    Args:
+        work: Function without arguments.
+        *kinds: Allowed kinds of the report; none allow all kinds.
+    """
     heard, begun = reports().heard, rospy.get_time()
     result = work()
 
@@ -240,4 +282,5 @@ def report_of(work: Callable[[], Any], *kinds: str) -> tuple[Any, dict[str, Any]
 
 
 def joint_goal(name: str, value: float) -> Constraints:
+    """Returns the goal constraints of a joint [rad]."""
     return Constraints(joint_constraints=[JointConstraint(joint_name=name, position=value)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trials of the laws of mechanics: what a simulated world does, and what the textbook says."""
+"""Trials of the laws of mechanics: a measured value of a simulated world, and the value of the law."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from simulated_samples import jointed, run
-
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_testing.simulation.simulated_samples import jointed, run
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 G = 9.81
+FLAT_MOMENTS = (0.0035, 0.0035, 0.0067)  # of 1 kg in a box of 0.2 x 0.2 x 0.04 m [kg m^2]
 MakeWorld = Callable[[], PhysicsWorld]
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a trial measured, and what the law says."""
+    """The measured value of a trial, and the value of the law."""
 
     measured: float
     expected: float
@@ -32,33 +32,63 @@ class Outcome:
         return abs(self.measured / self.expected - 1.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Friction coefficient and restitution of a body."""
+
+    mu: float = 0.8
+    bounce: float = 0.0
+
+
+ROUGH = Surface()
+
+
+def inertia(moments: Vector3, mass: float = 1.0) -> specs.Inertial:
+    """Returns the inertia of a mass [kg] with principal moments about the frame's axes [kg m^2]."""
+    x, y, z = moments
+    return specs.Inertial(Pose(), mass, (x, 0, 0, y, 0, z))
+
+
 def part(
     name: str,
     shape: specs.Geometry,
     pose: Pose,
-    moments: Vector3,
-    mass: float = 1.0,
-    mu: float = 0.8,
-    bounce: float = 0.0,
+    inertial: specs.Inertial,
+    surface: Surface = ROUGH,
+    *,
     static: bool = False,
 ) -> specs.Model:
-    """Returns a body with its own moments of inertia [kg m^2]."""
-    surface = specs.Collision("shape", Pose(), shape, specs.Friction(mu), specs.Bounce(bounce, 0.0))
-    x, y, z = moments
-    inertial = specs.Inertial(Pose(), mass, (x, 0, 0, y, 0, z))
-    return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (surface,), ()),), (), "law")
+    """Returns a body with one shape.
+
+    Args:
+        name: Name of the model.
+        shape: Shape.
+        pose: Pose in the world.
+        inertial: Mass and moments of inertia.
+        surface: Friction and restitution.
+        static: Whether the body never moves.
+    """
+    collision = specs.Collision("shape", Pose(), shape, specs.Friction(surface.mu), specs.Bounce(surface.bounce, 0.0))
+    return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (collision,), ()),), (), "law")
 
 
-def box(name: str, side: float, pose: Pose, mass: float = 1.0, mu: float = 0.8, bounce: float = 0.0) -> specs.Model:
-    """Returns a cube."""
-    moment = mass * side**2 / 6
-    return part(name, specs.Box((side,) * 3), pose, (moment,) * 3, mass, mu, bounce)
+def box(name: str, side: float, pose: Pose, mass: float = 1.0) -> specs.Model:
+    """Returns a cube.
+
+    Args:
+        name: Name of the model.
+        side: Edge length [m].
+        pose: Pose in the world.
+        mass: Mass [kg].
+    """
+    return part(name, specs.Box((side,) * 3), pose, inertia((mass * side**2 / 6,) * 3, mass))
 
 
 def slope(angle: float, mu: float) -> tuple[specs.Model, Pose]:
     """Returns a slope that goes down towards x, and the pose of its surface's centre."""
     pose = Pose.from_xyz_rpy((0, 0, 3), (0, angle, 0))
-    return part("slope", specs.Box((8, 2, 0.1)), pose, (1, 1, 1), mu=mu, static=True), pose @ Pose((0, 0, 0.05))
+    body = part("slope", specs.Box((8, 2, 0.1)), pose, inertia((1, 1, 1)), Surface(mu), static=True)
+    return body, pose @ Pose((0, 0, 0.05))
 
 
 def free_fall(make: MakeWorld) -> Outcome:
@@ -74,7 +104,7 @@ def slide(make: MakeWorld) -> Outcome:
     world, speed, mu = make(), 2.0, 0.4
     ground, top = slope(0.0, mu)
     world.spawn(ground)
-    flat = part("box", specs.Box((0.2, 0.2, 0.04)), top @ Pose((-2, 0, 0.02)), (0.0035, 0.0035, 0.0067), mu=mu)
+    flat = part("box", specs.Box((0.2, 0.2, 0.04)), top @ Pose((-2, 0, 0.02)), inertia(FLAT_MOMENTS), Surface(mu))
     body = world.spawn(flat)
     run(world, 0.2)
     begin = body.state().pose.position
@@ -84,12 +114,20 @@ def slide(make: MakeWorld) -> Outcome:
 
 
 def rolled(make: MakeWorld, shape: specs.Geometry, moments: Vector3, turn: Vector3, inertia_ratio: float) -> Outcome:
-    """Returns the way down a slope of 10 degrees in one second; `inertia_ratio` is I / (m r^2)."""
+    """Measures the distance down a slope of 10 degrees in one second.
+
+    Args:
+        make: Returns an empty world.
+        shape: Shape of the roller, with a radius of 0.05 m.
+        moments: Principal moments of inertia for 1 kg [kg m^2].
+        turn: Orientation of the shape at the start, as roll, pitch and yaw [rad].
+        inertia_ratio: I / (m r^2).
+    """
     world, angle, radius = make(), math.radians(10), 0.05
     ground, top = slope(angle, 0.8)
     world.spawn(ground)
     start = top @ Pose((-2, 0, radius)) @ Pose.from_xyz_rpy((0, 0, 0), turn)
-    body = world.spawn(part("roller", shape, start, moments))
+    body = world.spawn(part("roller", shape, start, inertia(moments)))
     run(world, 1.0)
     way = math.dist(body.state().pose.position, start.position)
     return Outcome(way, G * math.sin(angle) / (1 + inertia_ratio) / 2)
@@ -108,10 +146,18 @@ def roll_ball(make: MakeWorld) -> Outcome:
 
 
 def bounced(make: MakeWorld, shape: specs.Geometry, half: float, moment: float) -> Outcome:
-    """Returns the ratio of the velocities after and before an impact with restitution 0.8."""
+    """Measures the ratio of the velocities after and before an impact with restitution 0.8.
+
+    Args:
+        make: Returns an empty world.
+        shape: Shape of the body.
+        half: Height of the centre of the resting body [m].
+        moment: Moment of inertia about each axis [kg m^2].
+    """
     world, bounce = make(), 0.8
-    world.spawn(part("slab", specs.Box((1, 1, 1)), Pose(), (1, 1, 1), bounce=bounce, static=True))
-    body = world.spawn(part("body", shape, Pose((0, 0, 0.5 + half + 0.5)), (moment,) * 3, bounce=bounce))
+    surface = Surface(bounce=bounce)
+    world.spawn(part("slab", specs.Box((1, 1, 1)), Pose(), inertia((1, 1, 1)), surface, static=True))
+    body = world.spawn(part("body", shape, Pose((0, 0, 0.5 + half + 0.5)), inertia((moment,) * 3), surface))
     before = 0.0
     while (velocity := body.state().twist.linear[2]) <= before:
         before = velocity
@@ -210,7 +256,7 @@ def friction_cone(make: MakeWorld) -> Outcome:
         ground, top_pose = slope(math.atan(mu * middle), mu)
         world.spawn(ground)
         start = top_pose @ Pose((0, 0, 0.02))
-        body = world.spawn(part("box", specs.Box((0.2, 0.2, 0.04)), start, (0.0035, 0.0035, 0.0067), mu=mu))
+        body = world.spawn(part("box", specs.Box((0.2, 0.2, 0.04)), start, inertia(FLAT_MOMENTS), Surface(mu)))
         run(world, 1.0)
         slips = math.dist(body.state().pose.position, start.position) > 0.004
         low, high = (low, middle) if slips else (middle, high)

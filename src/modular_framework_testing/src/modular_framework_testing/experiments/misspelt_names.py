@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Misspelt and impossible names and values at every place where a name or a value may stand, and what refuses each."""
+"""Misspelt names and impossible values at every place of an experiment, a task and a launch, with their refusals."""
 
 from __future__ import annotations
 
@@ -90,13 +90,13 @@ GENERATOR = "/top_down_grasp_generator"
 
 @dataclass(frozen=True)
 class Case:
-    """One wrong name or value.
+    """A wrong name or value.
 
     Attributes:
-        place: Where it stands.
-        wrong: The name or value.
-        refused: Returns what refuses it, given a folder for files; "" if nothing does.
-        words: Pattern that the refusal has: the nearest name, or what is allowed.
+        place: File or mode with the name.
+        wrong: Name or value.
+        refused: Returns the text of the refusal, given a folder for files; "" without a refusal.
+        words: Pattern of the refusal: the most similar name, or the allowed values.
     """
 
     place: str
@@ -105,18 +105,18 @@ class Case:
     words: str
 
     def is_refused(self, folder: Path) -> bool:
-        """Returns whether it is refused with the words that help."""
+        """Returns whether the refusal contains the pattern."""
         return re.search(self.words, self.refused(folder), re.DOTALL) is not None
 
 
 @cache
 def checks() -> Any:
-    """Returns what looks up the settings of each mode, once: robots stay loaded."""
+    """Returns the checks of the settings of each mode; the loaded robots are cached."""
     return setting_checks()
 
 
 def experiment_faults(content: dict[str, Any], folder: Path) -> str:
-    """Returns the faults of an experiment; "" if it could run."""
+    """Returns the faults of an experiment; "" without a fault."""
     try:
         read_experiment(
             yaml.safe_dump(content), folder / "experiment.yaml", RosResourceLookup(), known_metrics(), checks()
@@ -127,7 +127,13 @@ def experiment_faults(content: dict[str, Any], folder: Path) -> str:
 
 
 def changed(base: dict[str, Any], path: tuple[Any, ...], value: Any) -> dict[str, Any]:
-    """Returns an experiment with another value at the end of a path of keys."""
+    """Returns a copy of an experiment with a changed value.
+
+    Args:
+        base: Experiment.
+        path: Keys and indices that lead to the value.
+        value: New value.
+    """
     content: dict[str, Any] = yaml.safe_load(yaml.safe_dump(base))
     inner: Any = content
     for key in path[:-1]:
@@ -137,7 +143,14 @@ def changed(base: dict[str, Any], path: tuple[Any, ...], value: Any) -> dict[str
 
 
 def in_experiment(base: dict[str, Any], path: tuple[Any, ...], value: Any, words: str) -> Case:
-    """Returns the case of a value in an experiment."""
+    """Returns the case of a value in an experiment.
+
+    Args:
+        base: Correct experiment.
+        path: Keys and indices that lead to the value.
+        value: Wrong value.
+        words: Pattern of the refusal.
+    """
     return Case(
         f"{base['mode']}: {'.'.join(map(str, path))}",
         str(value),
@@ -147,12 +160,24 @@ def in_experiment(base: dict[str, Any], path: tuple[Any, ...], value: Any, words
 
 
 def in_parameters(name: str, value: Any, words: str) -> Case:
-    """Returns the case of a ROS parameter in an experiment of mode task."""
+    """Returns the case of a ROS parameter in an experiment of mode task.
+
+    Args:
+        name: Name of the parameter.
+        value: Value of the parameter.
+        words: Pattern of the refusal.
+    """
     return in_experiment(TASK, ("parameters", name), value, words)
 
 
 def in_launch(argument: str, words: str, package: str = "modular_framework_api") -> Case:
-    """Returns the case of an argument of run_framework."""
+    """Returns the case of an argument of run_framework.
+
+    Args:
+        argument: `name:=value`.
+        words: Pattern of the refusal.
+        package: Package of the robot.
+    """
 
     def refused(folder: Path) -> str:
         path = roslaunch.rlutil.resolve_launch_arguments([package, "start_framework.launch"])[0]
@@ -166,7 +191,14 @@ def in_launch(argument: str, words: str, package: str = "modular_framework_api")
 
 
 def in_config(file: str, key: str, value: Any, words: str) -> Case:
-    """Returns the case of a value in a configuration file."""
+    """Returns the case of a value in a configuration file.
+
+    Args:
+        file: Name of the file.
+        key: Keys that lead to the value, separated by slashes.
+        value: Wrong value.
+        words: Pattern of the refusal.
+    """
 
     def refused(folder: Path) -> str:
         shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
@@ -180,7 +212,13 @@ def in_config(file: str, key: str, value: Any, words: str) -> Case:
 
 
 def in_hardware(old: str, new: str, words: str) -> Case:
-    """Returns the case of a text in the file of the hardware of the real robot."""
+    """Returns the case of a text in the file of the hardware of the real robot.
+
+    Args:
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
 
     def refused(folder: Path) -> str:
         shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
@@ -198,7 +236,13 @@ def in_hardware(old: str, new: str, words: str) -> Case:
 
 
 def in_controllers(old: str, new: str, words: str) -> Case:
-    """Returns the case of a text in a controller file of a robot's package."""
+    """Returns the case of a text in a controller file of a robot's package.
+
+    Args:
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
 
     def refused(folder: Path) -> str:
         package = Path(rospkg.RosPack().get_path("ur5_ezgripper_robot"))
@@ -220,7 +264,13 @@ def in_controllers(old: str, new: str, words: str) -> Case:
 
 
 def in_task(old: str, new: str, words: str) -> Case:
-    """Returns the case of a text in the task that an experiment names."""
+    """Returns the case of a text in the task that an experiment names.
+
+    Args:
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
 
     def refused(folder: Path) -> str:
         path = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
@@ -233,7 +283,13 @@ def in_task(old: str, new: str, words: str) -> Case:
 
 
 def in_script(text: str, words: str, state: str = "") -> Case:
-    """Returns the case of a task that `state_machine_generator --check` reads, with a state of the user's own."""
+    """Returns the case of a task that `state_machine_generator --check` reads, with a state of the user's own.
+
+    Args:
+        text: Task.
+        words: Pattern of the refusal.
+        state: Module of the state; "" for none.
+    """
 
     def refused(folder: Path) -> str:
         (folder / "own.yaml").write_text(text)
@@ -480,7 +536,7 @@ CASES = [
 
 
 def write_problem(folder: Path) -> None:
-    """Writes an empty planning problem, which experiments of mode planning name."""
+    """Writes an empty planning problem for experiments of mode planning."""
     (folder / PROBLEMS).mkdir(exist_ok=True)
     for kind in ("scene", "request"):
         (folder / PROBLEMS / f"{kind}0001.yaml").write_text("{}\n")

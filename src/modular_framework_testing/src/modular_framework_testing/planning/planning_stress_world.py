@@ -1,26 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scene as several clients change it at once, and whether a motion is free in a scene that was in force."""
+"""A scene that several clients change at once, and checks of motions in the scenes in force."""
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import rospy
 from moveit_msgs.msg import CollisionObject, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit/modular_framework_planning"))
-from independent_checker import IndependentChecker, Solid, box, pose_matrix  # noqa: E402
+from modular_framework_testing.planning.independent_checker import IndependentChecker, Solid, box, pose_matrix
 
 
 @dataclass(frozen=True)
 class Change:
-    """When a client asked for its objects to be these, and when it heard that they are."""
+    """A change of a client's objects: times of request and response [s, monotonic], objects afterwards."""
 
     begun: float
     ended: float
@@ -29,7 +26,7 @@ class Change:
 
 @dataclass
 class World:
-    """What each client has put into the scene, and when. Each client changes its own objects, from one thread."""
+    """Changes of the scene, by client. Each client changes its own objects, in one thread."""
 
     histories: dict[str, list[Change]] = field(default_factory=dict)
 
@@ -49,7 +46,7 @@ class World:
         history.append(Change(begun, time.monotonic(), objects))
 
     def objects_between(self, begun: float, ended: float) -> dict[str, CollisionObject]:
-        """Every object that may have been in the scene at some time of a span."""
+        """Returns all objects that may have been in the scene during a span, by name."""
         return {
             name: item
             for history in self.histories.values()
@@ -59,9 +56,14 @@ class World:
         }
 
     def was_free_of(self, touched: set[str], begun: float, ended: float) -> bool:
-        """Whether at some moment of a span the scene may have had none of the touched objects.
+        """Returns whether, at some moment of a span, the scene may have had none of the touched objects.
 
-        While a client waits for an answer, its objects may be the old ones or the new ones.
+        While a client waits for a response, its objects may be the old or the new ones.
+
+        Args:
+            touched: Names of the touched objects.
+            begun: Start of the span [s, monotonic].
+            ended: End of the span [s, monotonic].
         """
         changes = [item for history in self.histories.values() for item in history]
         moments = {
@@ -83,18 +85,18 @@ def _end(history: Sequence[Change], number: int) -> float:
 
 
 def _in_force(history: Sequence[Change], moment: float) -> list[Mapping[str, CollisionObject]]:
-    """What one client's objects may have been at a moment."""
+    """Returns the possible objects of a client at a moment."""
     found = [change.objects for number, change in enumerate(history) if change.begun <= moment <= _end(history, number)]
     return found + [{}] if moment <= history[0].ended else found
 
 
 def gone(name: str) -> CollisionObject:
-    """Takes an object out of the scene."""
+    """Returns the message that removes an object."""
     return CollisionObject(id=name, operation=CollisionObject.REMOVE)
 
 
 def obstacle(message: CollisionObject) -> tuple[str, Solid, np.ndarray]:
-    """A box for the independent checker."""
+    """Converts a box for the second checker."""
     size, place = message.primitives[0].dimensions, message.primitive_poses[0].position
     return message.id, box(*size), pose_matrix([place.x, place.y, place.z], np.eye(3))
 
@@ -105,9 +107,19 @@ def touched_bodies(
     path: np.ndarray,
     rest: Mapping[str, float],
     objects: Mapping[str, CollisionObject],
+    *,
     step: float,
 ) -> set[str]:
-    """Names of the bodies that touch another one along a path, looked at every `step` [rad] and at its end."""
+    """Returns the names of the bodies that touch another body along a path.
+
+    Args:
+        checker: Second checker of the robot; gets the objects.
+        names: Names of the joints in the columns of `path`.
+        path: Vertices, shape (n, joints).
+        rest: Positions of the other joints, by name.
+        objects: Objects of the scene, by name.
+        step: Maximum difference of a joint between samples [rad].
+    """
     checker.set_world([obstacle(item) for item in objects.values()])
     touched: set[str] = set()
     for values in _samples(path, step):
@@ -118,7 +130,7 @@ def touched_bodies(
 
 
 def _samples(path: np.ndarray, step: float) -> np.ndarray:
-    """States along the straight pieces between vertices; from one to the next no joint moves further than `step`."""
+    """Returns states on the straight pieces of a path; the joints differ by at most `step` between them."""
     lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path, axis=0)).max(axis=1))])
     at = np.linspace(0.0, lengths[-1], 1 + int(np.ceil(lengths[-1] / step)))
     return np.column_stack([np.interp(at, lengths, column) for column in path.T])

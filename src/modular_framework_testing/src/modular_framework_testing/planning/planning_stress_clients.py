@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clients that ask many questions with known answers at once, and what becomes of the answers; see stress()."""
+"""Concurrent clients with requests whose responses are known; see `stress`."""
 
 from __future__ import annotations
 
@@ -24,10 +24,20 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     RobotState,
 )
-from planning_stress_world import IndependentChecker, World, gone, touched_bodies
-from planning_wire import ARM, LAUNCH, OK, START, FakeArm, box, joint_goal, plan, request
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.planning.planning_stress_world import IndependentChecker, World, gone, touched_bodies
+from modular_framework_testing.planning.planning_wire import (
+    ARM,
+    LAUNCH,
+    OK,
+    START,
+    FakeArm,
+    box,
+    joint_goal,
+    plan,
+    request,
+)
 
 CHANGE_PERIOD_S = 0.1
 ANSWER_TIMEOUT_S = 40.0
@@ -41,7 +51,7 @@ FLIPPER = "flipper"  # the client that changes the scene all the time
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer of a client: the worlds in which it may have been planned, its own walls, the expected code."""
+    """A response: period in which its scene was in force, own walls, expected and actual code."""
 
     begun: float
     ended: float
@@ -53,13 +63,13 @@ class Answer:
 
 
 def wall_at(turn: float, name: str) -> CollisionObject:
-    """A box the forearm runs into when the shoulder is turned this far from the start."""
+    """Returns a box that the forearm hits when the shoulder is this far from the start [rad]."""
     x, y = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ [-0.11, 0.46]
     return box(name, float(x), float(y), 1.3, SIZE)
 
 
 class Clients:
-    """The threads that ask."""
+    """Clients of move_group, one thread each."""
 
     def __init__(self, world: World, seconds: float) -> None:
         self._world, self._end = world, time.monotonic() + seconds
@@ -68,7 +78,7 @@ class Clients:
         self._numbers = itertools.count()
 
     def run(self, clients: int) -> int:
-        """Lets all of them ask until the time is over; returns how many never came back."""
+        """Runs the clients until the end of the time; returns the number of clients that got no response."""
         kinds = [self._ask_action, self._prove, self._prove]
         works = [self._change, *(kinds[: max(0, clients - 1)]), *[self._ask_service] * max(1, clients - len(kinds))]
         threads = [
@@ -88,7 +98,7 @@ class Clients:
             self.errors.append(f"{work.__name__}: {type(error).__name__}: {error}")
 
     def _change(self, _: int) -> None:
-        """A box stands now here and now there, at fixed times; a change that comes too late does not hurry the next."""
+        """Moves a box between two places, at fixed times."""
         places = {"flip": wall_at(0.7, "flip"), "flop": wall_at(1.0, "flop")}
         self._world.change(FLIPPER, places["flop"])
         due = time.monotonic()
@@ -100,13 +110,20 @@ class Clients:
             self._world.change(FLIPPER, places[here], gone(there))
 
     def _note(
-        self, begun: float, response: Any, wanted: int, walls: tuple[CollisionObject, ...], kind: str, trajectory: Any
+        self,
+        begun: float,
+        response: Any,
+        wanted: int,
+        walls: tuple[CollisionObject, ...],
+        kind: str,
+        *,
+        trajectory: Any,
     ) -> None:
         points = np.array([point.positions for point in trajectory.joint_trajectory.points], dtype=float)
         self.answers.append(Answer(begun, time.monotonic(), response.error_code.val, wanted, points, walls, kind))
 
     def _question(self) -> tuple[tuple[CollisionObject, ...], int, str]:
-        """Walls of a question of one's own, and the code of the answer."""
+        """Returns the walls of a request and the expected code."""
         number = next(self._numbers)
         kind = ("no wall", "wall on the way", "wall at the goal")[number % 3]
         turn = {"wall on the way": WAY / 2, "wall at the goal": WAY}.get(kind)
@@ -114,7 +131,7 @@ class Clients:
         return walls, IN_COLLISION if kind == "wall at the goal" else OK, kind
 
     def _ask_service(self, _: int) -> None:
-        """The wall comes with the start state, attached to the robot's base: it counts for this question alone."""
+        """Requests a plan by the service; the wall is attached to the base of the start state."""
         walls, wanted, kind = self._question()
         state = RobotState(
             is_diff=True,
@@ -124,10 +141,10 @@ class Clients:
         )
         begun = time.monotonic()
         response = plan(request(joint_goal(PAN, START[0] + WAY), start_state=state, allowed_planning_time=20.0))
-        self._note(begun, response, wanted, walls, f"service, {kind}", response.trajectory)
+        self._note(begun, response, wanted, walls, f"service, {kind}", trajectory=response.trajectory)
 
     def _ask_action(self, _: int) -> None:
-        """The wall comes as planning_scene_diff."""
+        """Requests plans by the action; the wall is in planning_scene_diff."""
         client = SteadyActionClient("move_group", MoveGroupAction)
         assert client.wait_for_server(rospy.Duration(10.0))
         while time.monotonic() < self._end:
@@ -141,35 +158,38 @@ class Clients:
             client.send_goal(goal)
             assert client.wait_for_result(rospy.Duration(ANSWER_TIMEOUT_S)), "no result of the action"
             result = client.get_result()
-            self._note(begun, result, wanted, walls, f"action, {kind}", result.planned_trajectory)
+            self._note(begun, result, wanted, walls, f"action, {kind}", trajectory=result.planned_trajectory)
 
     def _prove(self, number: int) -> None:
-        """A wall at the goal is in force when the scene service has answered, and so is its absence."""
+        """Checks that a wall at the goal, and then its removal, are in force after the scene service responds."""
         name, turn = f"proof{number}", 1.8 + 0.6 * (number % 2)
         for wanted, message in ((IN_COLLISION, wall_at(turn, name)), (OK, gone(name))):
             self._world.change(name, message)
             begun = time.monotonic()
             response = plan(request(joint_goal(PAN, START[0] + turn), allowed_planning_time=20.0))
-            self._note(begun, response, wanted, (), "scene changed just before", response.trajectory)
+            self._note(begun, response, wanted, (), "scene changed just before", trajectory=response.trajectory)
 
 
 class Judge:
-    """Looks at answers with a checker that shares no code with the planner."""
+    """Judges responses with a checker that shares no code with the planner."""
 
     def __init__(self, checker: IndependentChecker, rest: dict[str, float], step: float) -> None:
-        """Args: the robot; its joints that are not planned for [rad or m]; between states looked at [rad].
+        """Checks that the straight motion is free without a wall and collides with a wall.
 
-        The straight motion must be free without a wall and collide with one, or the verdicts mean nothing.
+        Args:
+            checker: Second checker of the robot.
+            rest: Positions of the joints that are not planned for, by name [rad or m].
+            step: Maximum difference of a joint between checked states [rad].
         """
         self._checker, self._rest, self._step = checker, rest, step
         line, wall = np.array([START, [START[0] + WAY, *START[1:]]]), wall_at(WAY / 2, "wall")
         assert not self._touched(line, {}) and self._touched(line, {"wall": wall}) == {"wall"}
 
     def _touched(self, points: np.ndarray, objects: dict[str, CollisionObject]) -> set[str]:
-        return touched_bodies(self._checker, ARM, points, self._rest, objects, self._step)
+        return touched_bodies(self._checker, ARM, points, self._rest, objects, step=self._step)
 
     def fault(self, answer: Answer, world: World) -> str:
-        """What is wrong with an answer; empty where nothing is."""
+        """Returns the fault of a response; "" without a fault."""
         if answer.code in TIMED_OUT and answer.wanted == OK:
             return ""  # counted as timeouts: slow, but not wrong
         if answer.code != answer.wanted:
@@ -220,14 +240,14 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
     """Starts move_group, lets the clients ask, and judges every answer afterwards.
 
     Args:
-        session: a running master.
-        seconds: how long they ask.
-        clients: that plan; one more changes the scene.
-        step: between states the motions are looked at [rad].
+        session: Running `RosSession`.
+        seconds: Duration of the requests [s].
+        clients: Number of planning clients; one more client changes the scene.
+        step: Maximum difference of a joint between checked states [rad].
 
     Returns:
-        Figures: plans, wrong, timeouts, unanswered, scene_changes (of all clients), flips_per_s (of the one that
-        wants ten), rss_*_mb, wrong_answers (sentences), ...
+        Figures: plans, wrong, timeouts, unanswered, scene_changes (of all clients), flips_per_s (of the client that
+        attempts ten), rss_*_mb, wrong_answers (sentences), ...
     """
     session.launch(LAUNCH)
     session.wait_for_service("plan_kinematic_path", 120.0)
@@ -267,7 +287,7 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
 
 
 def robot_checker() -> IndependentChecker:
-    """The shipped robot, as the parameter server has it."""
+    """Returns the second checker of the robot on the parameter server."""
     from modular_framework_planning.robot_model.urdf_document import package_resolver
 
     return IndependentChecker(
