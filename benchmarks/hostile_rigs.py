@@ -26,7 +26,6 @@ from modular_framework_control.realtime.goal_handle import GoalStatus
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.realtime.scheduling import run_in_real_time
 from modular_framework_control.trajectory.trajectory_goal import GoalRejectedError, TrajectoryGoal, TrajectoryGoalHandle
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
@@ -36,6 +35,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 
 PERIOD_S = 0.008
 READY_S = 60.0

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import random
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modular_framework_testing.emulators.ur_emulator_process import random_local_address
 from modular_framework_testing.ros_session import RosSession, free_port
 
 TASK_TIMEOUT_S = 240.0
@@ -70,15 +69,14 @@ print(json.dumps(plans))
 
 @pytest.mark.parametrize("own_server", [False, True], ids=["gripper as hardware", "gripper with its own server"])
 def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tmp_path: Path, own_server: bool) -> None:
-    draw = random.Random(os.urandom(8))
-    address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+    address = random_local_address()
     port, path_log = tmp_path / "gripper", tmp_path / "path.csv"
     watcher = subprocess.Popen(
         [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     try:
         emulators = session.launch_package(
-            "modular_framework_drivers",
+            "modular_framework_testing",
             "emulators.launch",
             arm_address=address,
             arm_log=path_log,
@@ -111,7 +109,7 @@ CUTTER = """
 import sys, threading, time
 import rosgraph, rospy
 from modular_framework_core.msg import GraspActionGoal, GraspCommand
-from modular_framework_drivers.emulators.command_port import send_command
+from modular_framework_testing.emulators.command_port import send_command
 while not rosgraph.is_master_online():
     time.sleep(0.05)
 rospy.init_node("cutter", anonymous=True, disable_signals=True)
@@ -130,15 +128,14 @@ cut.wait()
 def test_a_gripper_that_loses_its_power_as_it_closes_ends_the_task_and_the_arm_does_not_lift(
     session: RosSession, tmp_path: Path
 ) -> None:
-    draw = random.Random(os.urandom(8))
-    address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+    address = random_local_address()
     port, path_log, command_port = tmp_path / "gripper", tmp_path / "path.csv", free_port()
     cutter = subprocess.Popen(
         [sys.executable, "-c", CUTTER, str(command_port)], env=session.env, stdout=subprocess.PIPE, text=True
     )
     try:
         emulators = session.launch_package(
-            "modular_framework_drivers",
+            "modular_framework_testing",
             "emulators.launch",
             arm_address=address,
             arm_log=path_log,

@@ -16,15 +16,15 @@ from std_srvs.srv import Trigger
 
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
-from modular_framework_drivers.emulators.command_port import send_command
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.emulators.command_port import send_command
 from modular_framework_testing.ros_session import free_port, until
 
 JOINT = "ezgripper_knuckle_palm_L1_1"
 LAUNCH = """<launch>
   <arg name="port"/>
   <arg name="command_port"/>
-  <include file="$(find modular_framework_drivers)/launch/emulators.launch">
+  <include file="$(find modular_framework_testing)/launch/emulators.launch">
     <arg name="arm" value="false"/>
     <arg name="gripper_port" value="$(arg port)"/>
     <arg name="gripper_command_port" value="$(arg command_port)"/>

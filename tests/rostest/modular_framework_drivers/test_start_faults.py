@@ -12,11 +12,11 @@ import rospy
 import serial
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ezgripper import mx64
+from modular_framework_testing.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_testing.ros_session import until
 
 NODE = """

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import os
-import random
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -16,16 +14,17 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from modular_framework_drivers.emulators.command_port import send_command
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.emulators.command_port import send_command
+from modular_framework_testing.emulators.ur_emulator_process import random_local_address
 from modular_framework_testing.ros_session import until
 
 START = [3.1375783963, -1.6559683943, 1.3870131566, -1.2662363723, -1.5707963268, 0.0]
 LAUNCH = """<launch>
   <arg name="address"/>
   <arg name="link_timeout" default="" doc="of the hardware [s]; empty: its own"/>
-  <include file="$(find modular_framework_drivers)/launch/emulators.launch">
+  <include file="$(find modular_framework_testing)/launch/emulators.launch">
     <arg name="gripper" value="false"/>
     <arg name="arm_address" value="$(arg address)"/>
     <arg name="arm_unlock_delay" value="0.0"/>
@@ -106,6 +105,5 @@ class Arm:
 
 def launched_arm(ros_launch: Callable[..., Any], **settings: object) -> Arm:
     """Launch everything with an emulator at an address that nobody else uses."""
-    draw = random.Random(os.urandom(8))
-    address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+    address = random_local_address()
     return Arm(ros_launch(LAUNCH, address=address, **settings), address)

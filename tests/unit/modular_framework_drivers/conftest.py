@@ -1,30 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Emulated devices for the tests of the drivers."""
+"""Emulated servo lines for the tests of the drivers."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
-import pytest
-
-from modular_framework_drivers.emulators.dynamixel_finger import Finger
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-
-
-@pytest.fixture
-def make_line(tmp_path: Path) -> Iterator[Callable[..., DynamixelLine]]:
-    """Makes a running line of emulated servos: `make_line(servo_id, ...)`."""
-    lines: list[DynamixelLine] = []
-
-    def make(*servo_ids: int, opening: float = 400.0) -> DynamixelLine:
-        fingers = [Finger(DynamixelServo(servo_id), opening=opening) for servo_id in servo_ids or (1,)]
-        line = DynamixelLine(fingers, tmp_path / f"gripper{len(lines)}")
-        line.connect()
-        lines.append(line)
-        return line
-
-    yield make
-    for line in lines:
-        line.close()
+from modular_framework_testing.emulators.dynamixel_fixture import make_line  # noqa: F401

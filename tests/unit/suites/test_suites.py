@@ -44,6 +44,7 @@ def test_every_suite_is_run_once_in_its_lane(runner: ModuleType) -> None:
     lanes = {suite.name: suite.lane for kind in runner.KINDS for suite in runner.suites_of(kind)}
     assert lanes["rostest/modular_framework_drivers/ur_arm_fault_times"] == "alone"
     assert lanes["unit/modular_framework_drivers/ur"] == lanes["system/test_hardware_pick"] == "emulated hardware"
+    assert lanes["unit/modular_framework_testing/emulators"] == "emulated hardware"
     assert lanes["system/test_simulated_pick"] == "whole launches"
     assert lanes["lint/ruff"] == "checkers" and lanes["unit/smach"] == "others"
 

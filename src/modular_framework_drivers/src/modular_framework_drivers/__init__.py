@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drivers of real devices, and emulators of these devices."""
+"""Drivers of real devices."""

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.grip import Motion
 from modular_framework_drivers.ezgripper.gripper_servos import joint_from_ticks
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+from modular_framework_testing.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
 
 MakeLine = Callable[..., DynamixelLine]
 MakeGripper = Callable[..., tuple[DynamixelLine, EzGripper]]

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo, Instruction
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.dynamixel_bus import READ, WRITE, DynamixelBus, NoResponseError
 from modular_framework_drivers.ezgripper.grip import Drive
 from modular_framework_drivers.ezgripper.gripper_servos import GripperError, GripperServos
 from modular_framework_drivers.ezgripper.mx64 import Register, ServoErrors
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo, Instruction
 
 CLOSED = -150
 

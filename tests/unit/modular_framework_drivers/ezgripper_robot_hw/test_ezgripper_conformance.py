@@ -15,11 +15,11 @@ from modular_framework_control.hardware_interface.joint_limits import JointLimit
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.hardware_interface.robot_hw_conformance import RobotHWConformance
-from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper.ezgripper_robot_hw import EzGripperRobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
+from modular_framework_testing.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
 
 JOINT = "ezgripper_knuckle_palm_L1_1"
 

@@ -11,9 +11,9 @@ import pytest
 from modular_framework_control.hardware_interface.joint_limits import JointLimits
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.hardware_interface.robot_hw_conformance import RobotHWConformance
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
+from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 
 
 class TestUrArm(RobotHWConformance):

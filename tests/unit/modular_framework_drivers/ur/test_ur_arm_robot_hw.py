@@ -24,9 +24,9 @@ from modular_framework_control.hardware_interface.interfaces import (
     PositionJointInterface,
     SpeedScalingInterface,
 )
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
+from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 
 PERIOD_S = 0.008
 LINK_TIMEOUT_S = 2.0  # a busy host may take a processor away for a second
@@ -298,7 +298,7 @@ def test_a_pause_in_the_midst_of_commands_is_none_either(rig: Rig) -> None:
 
 def processes(rig: Rig) -> dict[str, Path]:
     """Folders in /proc of the emulator and of the driver's two processes, by role."""
-    modules = {"modular_framework_drivers.emulators.ur_emulator", "modular_framework_drivers.ur.rtde_process"}
+    modules = {"modular_framework_testing.emulators.ur_emulator", "modular_framework_drivers.ur.rtde_process"}
     found = {}
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError):

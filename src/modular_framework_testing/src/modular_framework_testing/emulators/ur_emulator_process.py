@@ -11,11 +11,17 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from modular_framework_drivers.emulators.command_port import send_command
-from modular_framework_drivers.emulators.ur_controller import HOME
-from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT
+from modular_framework_testing.emulators.command_port import send_command
+from modular_framework_testing.emulators.ur_controller import HOME
+from modular_framework_testing.emulators.ur_emulator import COMMAND_PORT
 
-_MODULE = "modular_framework_drivers.emulators.ur_emulator"
+_MODULE = "modular_framework_testing.emulators.ur_emulator"
+
+
+def random_local_address() -> str:
+    """Returns a random address of this machine, 127.x.y.z, for an emulator beside others."""
+    draw = random.Random(os.urandom(8))  # independent of the seeds of a test
+    return f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
 
 
 class EmulatedArm:
@@ -31,8 +37,7 @@ class EmulatedArm:
     """
 
     def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0, positions: Sequence[float] = HOME) -> None:
-        generator = random.Random(os.urandom(8))  # 127.x.y.z is this machine; concurrent tests use different addresses
-        self.address = f"127.{generator.randint(16, 254)}.{generator.randint(0, 254)}.{generator.randint(1, 254)}"
+        self.address = random_local_address()
         self._process = subprocess.Popen(
             [
                 sys.executable,

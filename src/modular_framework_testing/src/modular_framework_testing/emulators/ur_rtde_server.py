@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_drivers.emulators.ur_controller import REGISTERS, UrController
-from modular_framework_drivers.emulators.ur_motion import flange_pose
+from modular_framework_testing.emulators.ur_controller import REGISTERS, UrController
+from modular_framework_testing.emulators.ur_motion import flange_pose
 
 _PROTOCOL, _VERSION, _DATA = ord("V"), ord("v"), ord("U")
 _OUTPUTS, _INPUTS, _START, _PAUSE = ord("O"), ord("I"), ord("S"), ord("P")

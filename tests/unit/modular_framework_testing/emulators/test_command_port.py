@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from modular_framework_drivers.emulators.command_port import CommandError, CommandPort, parse_value, send_command
+from modular_framework_testing.emulators.command_port import CommandError, CommandPort, parse_value, send_command
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from modular_framework_drivers.emulators.ur_motion import MAX_SERVO_ERROR, ArmMotion, Drive, MotionCommand
+from modular_framework_testing.emulators.ur_motion import MAX_SERVO_ERROR, ArmMotion, Drive, MotionCommand
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 REGISTERS = 48

@@ -21,13 +21,13 @@ from functools import partial
 from typing import IO
 
 from modular_framework_control.realtime.scheduling import run_in_real_time
-from modular_framework_drivers.emulators.command_port import CommandPort
-from modular_framework_drivers.emulators.ur_control_script import ProgramReceiver
-from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrController
-from modular_framework_drivers.emulators.ur_dashboard import BANNER, DashboardReceiver
-from modular_framework_drivers.emulators.ur_motion import JOINTS
-from modular_framework_drivers.emulators.ur_network import NetworkFaults, PortServer, Session
-from modular_framework_drivers.emulators.ur_rtde_server import REFUSALS, RtdeServer, RtdeSession
+from modular_framework_testing.emulators.command_port import CommandPort
+from modular_framework_testing.emulators.ur_control_script import ProgramReceiver
+from modular_framework_testing.emulators.ur_controller import HOME, MODELS, UrController
+from modular_framework_testing.emulators.ur_dashboard import BANNER, DashboardReceiver
+from modular_framework_testing.emulators.ur_motion import JOINTS
+from modular_framework_testing.emulators.ur_network import NetworkFaults, PortServer, Session
+from modular_framework_testing.emulators.ur_rtde_server import REFUSALS, RtdeServer, RtdeSession
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901

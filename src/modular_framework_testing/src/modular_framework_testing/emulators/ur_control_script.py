@@ -13,8 +13,8 @@ import logging
 import re
 from enum import IntEnum
 
-from modular_framework_drivers.emulators.ur_controller import UrController
-from modular_framework_drivers.emulators.ur_motion import JOINTS, Drive, MotionCommand
+from modular_framework_testing.emulators.ur_controller import UrController
+from modular_framework_testing.emulators.ur_motion import JOINTS, Drive, MotionCommand
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 _MARK = "RTDE Control Script Loaded"

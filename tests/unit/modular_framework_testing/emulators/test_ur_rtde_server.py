@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrController
-from modular_framework_drivers.emulators.ur_rtde_server import RtdeProtocolError, RtdeServer, RtdeSession
+from modular_framework_testing.emulators.ur_controller import HOME, MODELS, UrController
+from modular_framework_testing.emulators.ur_rtde_server import RtdeProtocolError, RtdeServer, RtdeSession
 
 
 def package(kind: str, payload: bytes = b"") -> bytes:

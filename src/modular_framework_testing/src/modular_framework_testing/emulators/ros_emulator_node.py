@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_drivers.emulators.command_port import Command
 from modular_framework_ros.node_handle import ParameterError
+from modular_framework_testing.emulators.command_port import Command
 
 
 class EmulatorNode(Protocol):

@@ -12,8 +12,6 @@ from pathlib import Path
 import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler, port_handler
 
-from modular_framework_drivers.emulators import dynamixel_line
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.ezgripper import dynamixel_bus, mx64
 from modular_framework_drivers.ezgripper.dynamixel_bus import (
     DynamixelBus,
@@ -22,6 +20,8 @@ from modular_framework_drivers.ezgripper.dynamixel_bus import (
     RefusedError,
 )
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+from modular_framework_testing.emulators import dynamixel_line
+from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
 
 MakeLine = Callable[..., DynamixelLine]
 

@@ -18,9 +18,9 @@ from typing import Any
 
 import pytest
 
-from modular_framework_drivers.emulators.command_port import CommandError
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_drivers.ur.dashboard import DashboardError, request_dashboard
+from modular_framework_testing.emulators.command_port import CommandError
+from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 
 HOME = [0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import rospy
 
-from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
-from modular_framework_drivers.emulators.ur_emulator import UrEmulator
 from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_testing.emulators.ros_emulator_node import offer_commands, run_emulator
+from modular_framework_testing.emulators.ur_emulator import UrEmulator
 
 
 class UrEmulatorNode:
@@ -20,7 +20,7 @@ class UrEmulatorNode:
     """
 
     def __init__(self) -> None:
-        read = DeclaredParameters("modular_framework_drivers", "ur_emulator").values
+        read = DeclaredParameters("modular_framework_testing", "ur_emulator").values
         *arm, self._log = read("~address", "~model", "~positions", "~unlock_delay", "~command_port", "~log")
         self._emulator = UrEmulator(*arm)
 

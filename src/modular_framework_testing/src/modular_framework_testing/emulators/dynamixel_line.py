@@ -16,12 +16,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_drivers.emulators.command_port import Command
-from modular_framework_drivers.emulators.dynamixel_finger import Finger
-from modular_framework_drivers.emulators.dynamixel_servo import BROADCAST, Instruction, PacketReader, bus_response
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+from modular_framework_testing.emulators.command_port import Command
+from modular_framework_testing.emulators.dynamixel_finger import Finger
+from modular_framework_testing.emulators.dynamixel_servo import BROADCAST, Instruction, PacketReader, bus_response
 
 BAUDRATE_MARGIN = 0.03
 """Maximum relative difference of the baud rates of client and servo."""

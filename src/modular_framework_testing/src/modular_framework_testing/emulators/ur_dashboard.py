@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from modular_framework_drivers.emulators.ur_controller import RobotMode, RuntimeState, SafetyMode, UrController
+from modular_framework_testing.emulators.ur_controller import RobotMode, RuntimeState, SafetyMode, UrController
 
 BANNER = "Connected: Universal Robots Dashboard Server\n"
 

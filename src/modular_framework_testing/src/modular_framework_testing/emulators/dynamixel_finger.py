@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
 
 STEP_S = 0.002
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modular_framework_drivers.emulators.ur_motion import (
+from modular_framework_testing.emulators.ur_motion import (
     MAX_ACCELERATION,
     MAX_VELOCITY,
     ArmMotion,

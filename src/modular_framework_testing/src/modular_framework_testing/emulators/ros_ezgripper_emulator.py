@@ -8,15 +8,15 @@ from pathlib import Path
 import rospy
 
 from modular_framework_control.realtime.scheduling import run_in_real_time
-from modular_framework_drivers.emulators.command_port import CommandPort
-from modular_framework_drivers.emulators.dynamixel_finger import Finger
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.ros_node_handle import RosNodeHandle
+from modular_framework_testing.emulators.command_port import CommandPort
+from modular_framework_testing.emulators.dynamixel_finger import Finger
+from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
+from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
+from modular_framework_testing.emulators.ros_emulator_node import offer_commands, run_emulator
 
 _PRIORITY, _LINE_PRIORITY = 40, 30
 
@@ -33,7 +33,7 @@ class EzGripperEmulatorNode:
     def __init__(self) -> None:
         handle = RosNodeHandle("~")
         settings = read_gripper_settings(handle, handle)
-        read = DeclaredParameters("modular_framework_drivers", "ezgripper_emulator").values
+        read = DeclaredParameters("modular_framework_testing", "ezgripper_emulator").values
         position, held_at, command_port = read("~position", "~object", "~command_port")
         opening = ticks_from_joint(position)
         word = round(2e6 / settings.baudrate) - 1

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_drivers.emulators.dynamixel_servo import (
+from modular_framework_drivers.ezgripper import mx64
+from modular_framework_drivers.ezgripper.mx64 import ServoErrors
+from modular_framework_testing.emulators.dynamixel_servo import (
     BROADCAST,
     DynamixelServo,
     Instruction,
@@ -16,8 +18,6 @@ from modular_framework_drivers.emulators.dynamixel_servo import (
     checksum,
     packet,
 )
-from modular_framework_drivers.ezgripper import mx64
-from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 
 def talk(servos: list[DynamixelServo], sent: str) -> str:
