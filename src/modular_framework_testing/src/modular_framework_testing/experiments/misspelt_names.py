@@ -353,7 +353,7 @@ CASES = [
     in_parameters("/gazebo/time_step", 0.05, "is 0.05; allowed: a number, at least 0.0001 and at most 0.01"),
     in_parameters("/gazebo/weld_grasp", True, "did you mean '/gazebo/weld_grasps'"),
     in_parameters(
-        f"{PIPELINE}/planner_configs/RRTConnect/range", -1, "'range' is '-1'.*allowed: a number of at least 0"
+        f"{PIPELINE}/planner_configs/RRTConnect/range", -1, "'range' is '-1'.*must be a number of at least 0"
     ),
     in_parameters(f"{PIPELINE}/planner_configs/RRTConnect/rnge", 1.0, "no setting 'rnge'.*did you mean 'range'"),
     in_parameters(f"{PIPELINE}/planner_configs/RRTConect/range", 1.0, "no planner 'RRTConect'.*'RRTConnect'"),
@@ -455,7 +455,9 @@ CASES = [
     # Other modes
     in_experiment(PLANNING, ("factors", "planner"), ["RRTConnect", "RTT"], "no planner 'RTT'.*did you mean 'RRT'"),
     in_experiment(PLANNING, ("pipeline",), "omple", "no pipeline 'omple'.*did you mean 'ompl'"),
-    in_experiment(PLANNING, ("group",), "pandaarm", "no planning group 'pandaarm'.*did you mean 'panda_arm'"),
+    in_experiment(
+        PLANNING, ("group",), "pandaarm", "planning group 'pandaarm' does not exist.*did you mean 'panda_arm'"
+    ),
     in_experiment(PLANNING, ("robot",), "panda_hand_moveit_confg", "did you mean 'panda_hand_moveit_config'"),
     in_experiment(PLANNING, ("planner_parameters",), {"rang": 1.0}, "no setting 'rang'.*did you mean 'range'"),
     in_experiment(PLANNING, ("planner_parameters",), {"range": "far"}, "'range' is 'far'.*a number of at least 0"),
