@@ -362,7 +362,7 @@ def test_no_finger_goes_on_once_a_fault_of_a_motor_is_reported(
     until(lambda: gripper.state().reading.position < 1.6)
     fault(line)
     until(lambda: bool(gripper.state().fault))
-    time.sleep(0.2)
+    until(lambda: all(abs(finger.speed) < 20.0 for finger in line.fingers))  # [ticks/s]; within 0.2 s if not busy
     stood = [finger.opening for finger in line.fingers]
     time.sleep(0.5)
     assert gripper.state().fault
