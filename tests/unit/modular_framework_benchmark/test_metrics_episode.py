@@ -32,7 +32,8 @@ TIMES = np.linspace(0.0, 4.0, 401)
 def planned(succeeded: bool, planning_time_s: float, length: float = 1.0, **figures: float) -> ComponentReport:
     motion = Motion(JOINTS, np.array([0.0, 1.0, 2.0]), np.array([[0, 0], [length, 0], [length, length]], dtype=float))
     return ComponentReport(
-        *("planning", "to_grasp", succeeded, "" if succeeded else "no path", 0.0, 0.0, planning_time_s),
+        *("planning", "to_grasp", succeeded, "" if succeeded else "no path", 0.0, 0.0),
+        wall_s=planning_time_s,
         figures={PLANNING_TIME: planning_time_s}
         | {declared("planning", name): value for name, value in figures.items()},
         motion=motion if succeeded else None,
@@ -68,7 +69,8 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
         method_processor_s=6.5,
         reports=(
             ComponentReport(
-                *("generation", "top_down", True, "", 0.0, 0.5, 0.25),
+                *("generation", "top_down", True, "", 0.0, 0.5),
+                wall_s=0.25,
                 figures={CANDIDATES: 40.0, CHECKED: 20.0, REACHABLE: 5.0},
             ),
             planned(True, 0.1, 1.0, clearance_m=0.03, processor_s=0.04, concurrent=2.0),

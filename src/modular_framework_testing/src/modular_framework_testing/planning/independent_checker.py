@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A second collision checker: its own forward kinematics of many states at once, one FCL call per pair of bodies.
 
-Of the planner it shares the reader of mesh files only. Pairs are left out where a sphere around one body does not reach
-the box around the other.
+Shares with the planner only the reader of mesh files and the refusal of DOCTYPEs. Pairs are left out where a sphere
+around one body does not reach the box around the other.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import fcl
 import numpy as np
 
 from modular_framework_urdf.mesh_reader import read_mesh
+from modular_framework_urdf.xml_text import refuse_doctype
 
 STATES_AT_ONCE = 500
 
@@ -179,6 +180,8 @@ class IndependentChecker:
     """Collision checks of the robot of a URDF and an SRDF, and of solids around it."""
 
     def __init__(self, urdf: str, srdf: str, resolve: Callable[[str], str]) -> None:
+        refuse_doctype(urdf, "URDF")
+        refuse_doctype(srdf, "SRDF")
         root, semantics = ET.fromstring(urdf), ET.fromstring(srdf)
         self._joints = {_text(_child(joint, "child"), "link"): _joint(joint) for joint in root.findall("joint")}
         self._links = [_text(link, "name") for link in root.findall("link")]
