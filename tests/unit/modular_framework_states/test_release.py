@@ -18,7 +18,7 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A hand that holds a can, in a scene that detaches it on request, or by itself after some reads."""
     state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="")
 
-    def send(_state: Any, _userdata: Any, stage: str, grasp: Any, _timeout_s: float) -> None:
+    def send(client: Any, stage: str, grasp: Any, **_: Any) -> None:
         state.sent.append((stage, grasp))
         if state.problem:
             raise GraspGoalError(state.problem)

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 from modular_framework_core.msg import GraspCommand, GraspGoal
-from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result
 
 Stage = Literal["pregrasp", "grasp", "postgrasp"]
@@ -24,30 +24,31 @@ class GraspGoalError(RuntimeError):
     """A stage was not reached; the message gives the reason."""
 
 
-def send(state: FrameworkState, userdata: Any, stage: Stage, grasp: Any, timeout_s: float) -> None:
+def send(
+    client: Any, stage: Stage, grasp: Any, *, max_torque: float, timeout_s: float, stop_requested: Callable[[], bool]
+) -> None:
     """Sends a grasp stage and returns once the server reports that the stage was reached.
 
     Args:
-        state: State that sends the stage; the goal is cancelled when the state is asked to stop.
-        userdata: Userdata with the client of the manipulator's action server, None if the task has no manipulator, and
-            the fraction of the maximum torque.
+        client: Client of the manipulator's action server; None if the task has no manipulator.
         stage: Stage of the grasp.
         grasp: Grasp message.
+        max_torque: Fraction of the maximum torque.
         timeout_s: Maximum wait for the end [s].
+        stop_requested: Function polled during the wait; the goal is cancelled when it returns True.
 
     Raises:
         GraspGoalError: The task has no manipulator or server, the stage was not reached, or a stop was requested.
     """
-    client = userdata.manipulator_controller_client
     if client is None:
         raise GraspGoalError("the task has no manipulator; set manipulator_prefix to drive one")
     try:
         wait_for_action(client, "the manipulator's action server", SERVER_TIMEOUT_S)
     except CallError as error:
         raise GraspGoalError(str(error)) from error
-    command = GraspCommand(grasp_state=_NUMBERS[stage], grasp=grasp, max_torque=float(userdata.max_torque))
+    command = GraspCommand(grasp_state=_NUMBERS[stage], grasp=grasp, max_torque=float(max_torque))
     client.send_goal(GraspGoal(grasp_command=command))
-    status = wait_for_result(client, timeout_s, state.preempt_requested)
+    status = wait_for_result(client, timeout_s, stop_requested)
     result = client.get_result()
     if status == SUCCEEDED and result is not None and getattr(result, _RESULT_FLAGS[stage]).data:
         return

@@ -52,7 +52,15 @@ class Grasp(FrameworkState):
         """Sends the goal and waits for its end."""
         try:
             grasp = selected_or_named(self, userdata, "grasp", self._name)
-            send(self, userdata, self._type, grasp, self._timeout_s)
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(
+                client,
+                self._type,
+                grasp,
+                max_torque=max_torque,
+                timeout_s=self._timeout_s,
+                stop_requested=self.preempt_requested,
+            )
             if self._verify_held and rospy.get_param(SIMULATION_PARAMETER, False) and not self._holds(grasp.object_id):
                 what = f"'{grasp.object_id}'" if grasp.object_id else "an object"
                 return self.fail(

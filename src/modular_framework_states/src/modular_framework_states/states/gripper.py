@@ -51,7 +51,15 @@ class Gripper(FrameworkState):
         try:
             positions = self._positions or posture_positions(self._posture)
             grasp = posture_grasp(positions, self._torque)
-            send(self, userdata, self._stage, grasp, self._timeout_s)
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(
+                client,
+                self._stage,
+                grasp,
+                max_torque=max_torque,
+                timeout_s=self._timeout_s,
+                stop_requested=self.preempt_requested,
+            )
         except (RobotModelError, GraspGoalError) as error:
             return self.fail(f"gripper to {wanted}: {error}")
         return self.succeed()

@@ -45,7 +45,15 @@ class Release(FrameworkState):
         """Opens the fingers and detaches the held objects."""
         try:
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
-            send(self, userdata, "pregrasp", grasp, self._timeout_s)
+            client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            send(
+                client,
+                "pregrasp",
+                grasp,
+                max_torque=max_torque,
+                timeout_s=self._timeout_s,
+                stop_requested=self.preempt_requested,
+            )
             if rospy.get_param(SIMULATION_PARAMETER, False):
                 wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
             elif held := held_objects():
