@@ -28,7 +28,7 @@ def commander(ros_session):
         lonely.connect(0.3)
     rospy.set_param("robot_description", "<robot/>")
     fake = FakeMoveGroup()
-    with pytest.raises(CommanderError, match="no planning group 'leg'"):
+    with pytest.raises(CommanderError, match="there is no group 'leg'"):
         ArmCommander("leg").connect(0.3)
     made = ArmCommander("arm")
     made.connect(60.0)
@@ -113,7 +113,7 @@ def test_another_group_is_planned_for_with_settings_of_its_own(commander) -> Non
     assert "group 'hand' is not a chain" in hand.plan_to_pose_target(pose(0.3)).reason
     assert "group 'hand' is not a chain" in hand.solve_ik(pose(0.3)).reason
     assert set(commander.positions_of(["jx", "f", "nobody"])) == {"jx", "f"}
-    with pytest.raises(CommanderError, match="no planning group 'leg'"):
+    with pytest.raises(CommanderError, match="there is no group 'leg'"):
         commander.of_group("leg")
 
 
