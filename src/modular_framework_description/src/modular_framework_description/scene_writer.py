@@ -33,8 +33,8 @@ def world_scene_text(world_file: Path, models_dir: Path) -> str:
 
 
 def _scene_object(model: specs.Model, link: specs.Link) -> SceneObject:
-    """Returns the object of a link, with the ID that the simulation gives it in the planning scene."""
-    name, pose, origin = f"{model.name}__{link.name}", model.pose @ link.pose, Pose()
+    """Returns the object of a link."""
+    name, pose, origin = specs.collision_object_id(model.name, link.name), model.pose @ link.pose, Pose()
     shapes = tuple(_scene_shape(name, collision.geometry, pose @ collision.pose) for collision in link.collisions)
     return SceneObject(name, origin.position, origin.quaternion, shapes)
 

@@ -107,11 +107,6 @@ def state_from_msgs(pose: PoseMsg, twist: TwistMsg) -> BodyState:
     return BodyState(pose_from_msg(pose), twist_from_msg(twist))
 
 
-def collision_object_id(model: str, link: str) -> str:
-    """Returns the id of a simulated link in the planning scene."""
-    return f"{model}__{link}"
-
-
 def link_to_collision_object(model: str, link: specs.Link, frame: str, pose: Pose) -> CollisionObject:
     """Returns the exact collision shapes of a link, with the triangles of meshes and with primitives.
 
@@ -126,7 +121,7 @@ def link_to_collision_object(model: str, link: specs.Link, frame: str, pose: Pos
     """
     message = CollisionObject()
     message.header.frame_id = frame
-    message.id = collision_object_id(model, link.name)
+    message.id = specs.collision_object_id(model, link.name)
     message.operation = CollisionObject.ADD
     message.pose = pose_to_msg(pose)
     for collision in link.collisions:

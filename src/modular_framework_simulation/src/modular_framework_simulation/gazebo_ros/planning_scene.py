@@ -36,6 +36,7 @@ from modular_framework_simulation.gazebo_ros.scene_changes import (
     SceneChanges,
 )
 from modular_framework_simulation.loop.snapshots import WorldSnapshot
+from modular_framework_simulation.models import sdf_specs as specs
 
 _SYNC_PERIOD_S = 0.1
 _PRESENCE_PERIOD_S = 0.5
@@ -146,7 +147,7 @@ class PlanningScenePublisher:
             return _SYNC_PERIOD_S
         response = rospy.ServiceProxy(ros_names.APPLY_PLANNING_SCENE, ApplyPlanningScene)(self._message(changes))
         if not response.success:
-            names = sorted({conversions.collision_object_id(*change.key) for change in changes})
+            names = sorted({specs.collision_object_id(*change.key) for change in changes})
             return self._fail(f"move_group rejected a change of {', '.join(names)}")
         self._changes.confirm()
         if self._logged_problem:
@@ -164,7 +165,7 @@ class PlanningScenePublisher:
         self._compared_s = time.monotonic()
         cost_s = self._compared_s - start_s
         self._compare_pause_s = min(max(_COMPARE_PAUSE_S, cost_s / _MAX_COMPARE_FRACTION), _COMPARE_PERIOD_S)
-        ids = {conversions.collision_object_id(*key): key for key in self._changes.keys}
+        ids = {specs.collision_object_id(*key): key for key in self._changes.keys}
         in_world = {ids[item.id] for item in scene.world.collision_objects if item.id in ids}
         held = scene.robot_state.attached_collision_objects
         attached = {ids[item.object.id]: item.link_name for item in held if item.object.id in ids}
@@ -172,7 +173,7 @@ class PlanningScenePublisher:
             rospy.logwarn(
                 "planning scene: another node removed '%s', which is still in the simulated world; motions are planned "
                 "without this object until it moves or is spawned again. Remove all objects to restore all of them",
-                conversions.collision_object_id(*key),
+                specs.collision_object_id(*key),
             )
 
     def _server_available(self) -> bool:
@@ -214,7 +215,7 @@ class PlanningScenePublisher:
 
     def _add(self, scene: PlanningScene, change: Change) -> None:
         model, link = change.key
-        identity = conversions.collision_object_id(model, link)
+        identity = specs.collision_object_id(model, link)
         attached, world = scene.robot_state.attached_collision_objects, scene.world.collision_objects
         if isinstance(change, Add | Attach) and change.link.visuals:
             scene.object_colors.append(ObjectColor(identity, ColorRGBA(*change.link.visuals[0].colour)))

@@ -325,3 +325,8 @@ class World:
     models: tuple[Model, ...]
     ignored: tuple[str, ...]
     step_s: float | None = None
+
+
+def collision_object_id(model: str, link: str) -> str:
+    """Returns the ID of a simulated link in the planning scene."""
+    return f"{model}__{link}"
