@@ -22,8 +22,13 @@ _Handler = Callable[[socket.socket, tuple[str, int]], None]
 
 class _ParallelServer(tcpros_base.TCPServer):  # type: ignore[misc]
     def __init__(self, inbound_handler: _Handler, port: int = 0) -> None:
-        super().__init__(_on_own_thread(inbound_handler), port)
-        self.server_sock.listen(BACKLOG)
+        super().__init__(inbound_handler, port)
+        self.accept_at_once()
+
+    def accept_at_once(self) -> None:
+        """Calls the handler of each connection on a thread of its own."""
+        self.inbound_handler = _on_own_thread(self.inbound_handler)
+        self.server_sock.listen(BACKLOG)  # the length of the queue may be changed at any time
 
 
 def accept_connections_at_once() -> None:
@@ -31,9 +36,8 @@ def accept_connections_at_once() -> None:
     tcpros_base.TCPServer = _ParallelServer
     running = getattr(getattr(tcpros_base, "_tcpros_server", None), "tcp_ros_server", None)
     if running is not None and not isinstance(running, _ParallelServer):
-        running.inbound_handler = _on_own_thread(running.inbound_handler)
         running.__class__ = _ParallelServer
-        running.server_sock.listen(BACKLOG)  # the length of the queue may be changed at any time
+        running.accept_at_once()
 
 
 def _on_own_thread(handler: _Handler) -> _Handler:
