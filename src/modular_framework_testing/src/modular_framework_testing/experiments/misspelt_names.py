@@ -211,6 +211,12 @@ def in_config(file: str, key: str, value: Any, words: str) -> Case:
     return Case(file, f"{key}: {value}", refused, words)
 
 
+def _replaced(text: str, old: str, new: str) -> str:
+    """Returns a text with its first occurrence of `old` replaced, which must exist."""
+    assert old in text, old
+    return text.replace(old, new, 1)
+
+
 def in_hardware(old: str, new: str, words: str) -> Case:
     """Returns the case of a text in the file of the hardware of the real robot.
 
@@ -225,8 +231,7 @@ def in_hardware(old: str, new: str, words: str) -> Case:
         for path in shipped.iterdir():
             (folder / path.name).write_bytes(path.read_bytes())
         text = (folder / "connection_hardware.yaml").read_text()
-        assert old in text, old
-        (folder / "connection_hardware.yaml").write_text(text.replace(old, new, 1))
+        (folder / "connection_hardware.yaml").write_text(_replaced(text, old, new))
         path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
         arguments = [f"config_directory:={folder}", "simulation:=false", "task_constructor_script:=pick_and_hold.yaml"]
         check_arguments(path, arguments)
@@ -247,9 +252,8 @@ def in_controllers(old: str, new: str, words: str) -> Case:
     def refused(folder: Path) -> str:
         package = Path(rospkg.RosPack().get_path("ur5_ezgripper_robot"))
         text = (package / "controllers" / "ur5_ezgripper_controller_simulation.yaml").read_text()
-        assert old in text, old
         (folder / "controllers").mkdir()
-        (folder / "controllers" / "mine.yaml").write_text(text.replace(old, new, 1))
+        (folder / "controllers" / "mine.yaml").write_text(_replaced(text, old, new))
         (folder / "package.xml").write_text("<package><name>my_robot</name></package>")
         spawner = LaunchedNode("modular_framework_core", "robot_controllers_spawner", "/s", "/", "my_robot mine.yaml")
         joints = (*yaml.safe_load(text)["arm_trajectory_controller"]["joints"], "ezgripper_knuckle_palm_L1_1")
@@ -275,8 +279,7 @@ def in_task(old: str, new: str, words: str) -> Case:
     def refused(folder: Path) -> str:
         path = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
         text = (path / "pick_and_hold.yaml").read_text()
-        assert old in text, old
-        (folder / "task.yaml").write_text(text.replace(old, new, 1))
+        (folder / "task.yaml").write_text(_replaced(text, old, new))
         return experiment_faults({**TASK, "task": "task.yaml"}, folder)
 
     return Case("task of an experiment", new, refused, words)
