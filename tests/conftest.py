@@ -29,6 +29,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     config.hook.pytest_deselected(items=left_out)
 
 
+def pytest_collection_finish() -> None:
+    """Keeps hypothesis from reading every imported module for constants, which takes each process up to 15 s."""
+    if providers := sys.modules.get("hypothesis.internal.conjecture.providers"):
+        providers._get_local_constants = lambda: providers._local_constants
+
+
 @pytest.fixture(scope="session")
 def real_time_permitted() -> bool:
     """Whether the system lets a thread run in real time as urgently as a control loop; tried, not guessed."""
