@@ -16,6 +16,12 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 import rospy
+from moveit_msgs.msg import PlannerInterfaceDescription
+from moveit_msgs.srv import (
+    QueryPlannerInterfaces,
+    QueryPlannerInterfacesRequest,
+    QueryPlannerInterfacesResponse,
+)
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
@@ -42,6 +48,21 @@ class Give(FrameworkState):
 
     def execute(self, userdata):
         return self.succeed() if self._answer else self.fail(self._why)
+""",
+    "choose.py": """
+from typing import Annotated
+
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Named
+
+
+class Choose(FrameworkState):
+    def __init__(self, planner: Annotated[str, Named("planner")], outcomes=("success", "fail"), input_keys=(),
+                 output_keys=(), io_keys=()):
+        super().__init__(outcomes, input_keys, output_keys, io_keys)
+
+    def execute(self, userdata):
+        return self.succeed()
 """,
     "stay.py": """
 from modular_framework_core.state_api.framework_state import FrameworkState
@@ -196,6 +217,24 @@ def test_the_success_outcome_exits_with_0_and_says_so_in_the_last_line(run) -> N
     assert code == 0, output
     assert output.strip().splitlines()[-1] == "Task 'tiny' ended with outcome 'done': SUCCEEDED"
     assert "first state running: A after" in output
+
+
+def test_a_planner_that_move_group_lacks_is_refused_before_the_first_state(run) -> None:
+    def planners(_: QueryPlannerInterfacesRequest) -> QueryPlannerInterfacesResponse:
+        names = ["RRTConnect", "arm[Quick]"]
+        return QueryPlannerInterfacesResponse([PlannerInterfaceDescription(pipeline_id="ompl", planner_ids=names)])
+
+    text = task("  - A: {{source: choose, planner: {}, transitions: {{success: done, fail: gave_up}}}}\n")
+    service = rospy.Service("query_planner_interface", QueryPlannerInterfaces, planners)
+    try:
+        refused = {name: run(text.format(name)).end() for name in ("RRTConect", "ompl/Quik", "Quick")}
+    finally:
+        service.shutdown("the test ends")
+    assert refused["RRTConect"][0] == refused["ompl/Quik"][0] == 2
+    assert "the planner 'RRTConect' is unknown" in refused["RRTConect"][1]
+    assert "did you mean 'RRTConnect'?" in refused["RRTConect"][1]
+    assert "did you mean 'ompl/Quick'?" in refused["ompl/Quik"][1]
+    assert refused["Quick"][0] == 0, refused["Quick"][1]
 
 
 def test_another_outcome_exits_with_1_and_reports_the_reason_of_the_state(run) -> None:

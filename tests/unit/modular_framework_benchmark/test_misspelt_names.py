@@ -12,15 +12,20 @@ import sys
 from pathlib import Path
 
 import pytest
+import roslaunch.rlutil
+import rospkg
 import yaml
 
 from modular_framework_benchmark.commands.mode_runners import known_metrics
 from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
+from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
+from modular_framework_core.launching.ros_launch_preview import preview_launch
 from modular_framework_testing.experiments.misspelt_names import (
     CASES,
+    FIRST_STATE,
     GENERATOR,
     GRASPS,
     KINEMATICS,
@@ -29,6 +34,7 @@ from modular_framework_testing.experiments.misspelt_names import (
     PIPELINE,
     PLAIN,
     PLANNING,
+    SET_PLANNER,
     TASK,
     Case,
     changed,
@@ -221,6 +227,20 @@ for kind in ("my_arm/MyArm", "my_arm/MyArn"):
     ).stdout
     right, misspelt = printed.splitlines()
     assert right == "[]" and "did you mean 'my_arm/MyArm'" in misspelt
+
+
+def test_wrong_settings_of_a_planner_that_only_the_task_names_are_refused(tmp_path: Path) -> None:
+    text = (
+        Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts/pick_and_hold.yaml"
+    ).read_text()
+    (tmp_path / "task.yaml").write_text(text.replace(FIRST_STATE, SET_PLANNER.format("ompl/RRT") + FIRST_STATE))
+    path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
+    launch = preview_launch(path, [f"task_constructor_script:={tmp_path / 'task.yaml'}"])
+    of_file = {f"{PIPELINE}/planner_configs": {"RRT": {"type": "geometric::RRT", "goal_bias": 2.0}}}
+    assert LaunchCheck(launch).faults() == []
+    (fault,) = LaunchCheck(launch.with_parameters(of_file)).faults()
+    assert fault.key == "task"
+    assert "planner 'ompl/RRT', which the task names: " in fault.text and "'goal_bias' is '2.0'" in fault.text
 
 
 def test_a_state_of_another_robot_is_no_fault(tmp_path: Path) -> None:

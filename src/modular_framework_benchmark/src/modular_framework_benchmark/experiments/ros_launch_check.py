@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +16,12 @@ from modular_framework_benchmark.experiments.ros_move_group_names import (
 )
 from modular_framework_benchmark.experiments.ros_pipeline_names import PipelineNames, unknown_name
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
-from modular_framework_core.files import default_folders
-from modular_framework_core.files.faults import TaskFault
+from modular_framework_benchmark.experiments.ros_task_check import CacheableNames, checked_task
 from modular_framework_core.launching.launch_values import CONFIGURATION
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
 from modular_framework_core.task_constructor import generator, pipeline
-from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
+from modular_framework_core.task_constructor.known_names import KnownNames, PlannerNames, names_of_config
 from modular_framework_core.task_constructor.named_joints import named_joint_faults
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.kinematics_settings import KEYS, NUMERIC, PLUGINS, is_known_solver
@@ -209,47 +207,26 @@ class LaunchCheck:
                     yield LaunchFault(name, f"argument '{name}': there is no folder {folder}", ARGUMENTS)
                     return
         names = self._known_names(str(own.get("config_directory", "")))
-        yield from _task_faults(script, tuple(folders[0]), tuple(folders[1]), _Names(names))
+        checked = checked_task(script, tuple(folders[0]), tuple(folders[1]), CacheableNames(names))
+        yield from checked.faults
+        yield from self._task_planner_faults(checked.planners)
+
+    def _task_planner_faults(self, planners: Iterable[str]) -> Iterator[LaunchFault]:
+        """Yields the invalid settings of the planners that only the task names."""
+        registry, group = self.registry(), str(self.launch.parameters.get("/arm_group_name", ""))
+        if registry is None:
+            return
+        for planner in sorted({*planners} - {value for _, value in self._names.naming("planner")}):
+            for text in registry.faults(registry.resolve(planner, group)):
+                fault = f"planner '{planner}', which the task names: {text.replace('; it is ignored', '')}"
+                yield LaunchFault("", fault, "task")
 
     def _known_names(self, config: str) -> KnownNames:
         names = names_of_config(Path(config)) if config else KnownNames()
         srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
         names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
         registry = self.registry()
-        return names if registry is None else names.with_planners(frozenset(registry.all_names()))
-
-
-class _Names:
-    """Hashable names that a task may use, as a cache key of the task check."""
-
-    def __init__(self, names: KnownNames) -> None:
-        self.names = names
-        self._content = repr(sorted((kind, sorted(found)) for kind, found in names.names.items()))
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Names) and self._content == other._content
-
-    def __hash__(self) -> int:
-        return hash(self._content)
-
-
-@lru_cache(maxsize=64)
-def _task_faults(
-    script: str, states: tuple[Path, ...], templates: tuple[Path, ...], known: _Names
-) -> tuple[LaunchFault, ...]:
-    """Returns the faults of a task; the cache assumes that its files do not change while an experiment is read."""
-    try:
-        pipeline.check_task(
-            default_folders.task_script(Path(script)),
-            default_folders.states_folders(states),
-            default_folders.templates_folders(templates),
-            known.names,
-        )
-    except TaskFault as error:
-        return tuple(LaunchFault("", f"the task: {fault}", "task") for fault in error.faults)
-    except (OSError, ValueError) as error:
-        return (LaunchFault("", f"the task cannot be read: {error}", "task"),)
-    return ()
+        return names if registry is None else names.with_planners(lambda: PlannerNames(registry.by_pipeline()))
 
 
 def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:

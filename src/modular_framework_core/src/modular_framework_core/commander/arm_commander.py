@@ -28,8 +28,6 @@ from moveit_msgs.srv import (
     GetPositionIKRequest,
     GetStateValidity,
     GetStateValidityRequest,
-    QueryPlannerInterfaces,
-    QueryPlannerInterfacesRequest,
 )
 from sensor_msgs.msg import JointState
 
@@ -45,13 +43,14 @@ from modular_framework_core.commander.moveit_requests import (
 from modular_framework_core.commander.results import ExecutionResult, IkResult, PlanResult
 from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
+from modular_framework_core.commander.ros_planner_names import planners_by_pipeline
 from modular_framework_core.commander.ros_planning_reports import PlanningReports
+from modular_framework_core.task_constructor.known_names import PlannerNames
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.calls import (
     CallError,
     call_service,
-    request_service,
     wait_for_action,
     wait_for_result,
     wait_for_service,
@@ -63,7 +62,6 @@ from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
 
 EXECUTE_ACTION = "execute_trajectory"
-PLANNERS_SERVICE = "query_planner_interface"
 CLOCK_WAIT_S = 0.3
 SERVICE_TIMEOUT_S = 10.0
 IK_TIMEOUT_S = 1.0
@@ -215,27 +213,14 @@ class ArmCommander:
         Raises:
             CommanderError: move_group does not answer.
         """
-        available = self._planners().items()
-        return sorted(
-            {name for item, planners in available for planner in planners for name in (planner, f"{item}/{planner}")}
-        )
+        return sorted(PlannerNames(self._planners()))
 
     def _planners(self) -> dict[str, set[str]]:
         """Returns the planners available to this group, by pipeline."""
-        request = QueryPlannerInterfacesRequest()
         try:
-            response = request_service(PLANNERS_SERVICE, QueryPlannerInterfaces, request, SERVICE_TIMEOUT_S)
+            return planners_by_pipeline(group=self.group_name)
         except CallError as error:
             raise CommanderError(str(error)) from error
-        group_prefix = f"{self.group_name}["
-        return {
-            item.pipeline_id: {
-                name.removeprefix(group_prefix).removesuffix("]")
-                for name in item.planner_ids
-                if name.startswith(group_prefix) or not name.endswith("]")
-            }
-            for item in response.planner_interfaces
-        }
 
     def set_num_planning_attempts(self, attempts: int) -> None:
         """Sets the number of planning attempts.

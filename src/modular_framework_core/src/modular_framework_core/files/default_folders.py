@@ -66,17 +66,25 @@ def task_script(name: Path) -> Path:
     return folder / SCRIPTS_FOLDER / name
 
 
-def srdf_file(package: str = "") -> Path | None:
-    """Returns the SRDF of a MoveIt configuration package, by default the package in the API package's launch file.
+def moveit_config_folder(package: str = "") -> Path | None:
+    """Returns the folder of a MoveIt configuration package, by default the package in the API package's launch file.
 
-    Returns None if the package is missing or does not have exactly one SRDF.
+    Returns None if the package is not found.
     """
     api = _package(API_PACKAGE)
     launch = None if api is None else api / "launch" / LAUNCH_FILE
     if not package and launch is not None and launch.is_file():
         args = xml_text.read(launch).findall("arg")
         package = next((item.get("default", "") for item in args if item.get("name") == "moveit_config_package"), "")
-    folder = _package(package) if package else None
+    return _package(package) if package else None
+
+
+def srdf_file(package: str = "") -> Path | None:
+    """Returns the SRDF of a MoveIt configuration package, by default the package in the API package's launch file.
+
+    Returns None if the package is missing or does not have exactly one SRDF.
+    """
+    folder = moveit_config_folder(package)
     srdf_files = [] if folder is None else sorted(folder.glob("config/*.srdf"))
     return srdf_files[0] if len(srdf_files) == 1 else None
 

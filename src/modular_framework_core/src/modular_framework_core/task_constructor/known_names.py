@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,32 @@ JOINT_STATES_FILE, TRAJECTORIES_FILE = "named_joint_states.yaml", "named_traject
 _FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": "named_poses.yaml"}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
+PLANNER = "planner"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerNames(Collection[str]):
+    """Names of planners, each as PLANNER and as PIPELINE/PLANNER.
+
+    Attributes:
+        by_pipeline: Pipeline -> planners; empty for a pipeline that accepts any planner.
+    """
+
+    by_pipeline: Mapping[str, Collection[str]]
+
+    def __contains__(self, name: object) -> bool:
+        pipeline, _, planner = str(name).rpartition("/")
+        if not pipeline:
+            return any(planner in planners for planners in self.by_pipeline.values())
+        planners = self.by_pipeline.get(pipeline)
+        return planners is not None and (planner in planners or not planners)
+
+    def __iter__(self) -> Iterator[str]:
+        pairs = [(pipeline, planner) for pipeline, planners in self.by_pipeline.items() for planner in planners]
+        return iter(dict.fromkeys(text for pipeline, item in pairs for text in (item, f"{pipeline}/{item}")))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,27 +52,32 @@ class KnownNames:
     """Known names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, planner.
 
     Attributes:
-        names: Kind -> known names. Names of an absent kind are not checked.
+        names: Kind -> known names, except for planners. Names of an absent kind are not checked.
         origins: Kind -> source of its names, for messages.
         manipulator_group: Planning group whose named states are the postures; "" if unknown.
+        planners: Function that returns the available planners, called only for tasks that name a planner because the
+            names are slow to find. Returns None if planners are not checked.
     """
 
     names: Mapping[str, frozenset[str]] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     manipulator_group: str = ""
+    planners: Callable[[], PlannerNames | None] = lambda: None
+
+    def of_kind(self, kind: str) -> Collection[str] | None:
+        """Returns the known names of a kind; None if names of this kind are not checked."""
+        return self.planners() if kind == PLANNER else self.names.get(kind)
 
     def with_names(self, further_names: Mapping[str, frozenset[str]]) -> KnownNames:
         """Returns a copy with further names. Absent kinds stay absent, except for ``plan``."""
         merged = {kind: names | further_names.get(kind, frozenset()) for kind, names in self.names.items()}
-        return KnownNames(
-            merged | {"plan": merged.get("plan", frozenset()) | further_names.get("plan", frozenset())},
-            self.origins,
-            self.manipulator_group,
+        return replace(
+            self, names=merged | {"plan": merged.get("plan", frozenset()) | further_names.get("plan", frozenset())}
         )
 
-    def with_planners(self, planners: frozenset[str]) -> KnownNames:
-        """Returns a copy with the available planners."""
-        return KnownNames({**self.names, "planner": planners}, self.origins, self.manipulator_group)
+    def with_planners(self, planners: Callable[[], PlannerNames | None]) -> KnownNames:
+        """Returns a copy with the function that returns the available planners; the copy calls the function once."""
+        return replace(self, planners=cache(planners))
 
     def with_robot(self, srdf: str, origin: str) -> KnownNames:
         """Returns a copy with the planning groups and postures of a robot.
@@ -63,7 +95,7 @@ class KnownNames:
         if self.manipulator_group in groups:
             names["posture"] = frozenset(robot.group_states.get(self.manipulator_group, {}))
             origins["posture"] = f"group '{self.manipulator_group}' of {origin}"
-        return KnownNames(names, origins, self.manipulator_group)
+        return replace(self, names=names, origins=origins)
 
 
 def names_of_config(folder: Path) -> KnownNames:

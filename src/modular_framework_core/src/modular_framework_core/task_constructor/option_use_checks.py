@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
@@ -19,13 +19,13 @@ from modular_framework_core.state_api.option_uses import (
     OutputKeys,
     kind_of,
 )
-from modular_framework_core.task_constructor.known_names import KnownNames
+from modular_framework_core.task_constructor.known_names import PLANNER, KnownNames
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 from modular_framework_ros.allowed_names import listing, nearest
 
 _PLURALS = {"trajectory": "trajectories"}
-_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", "planner": "planner"}
+_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", PLANNER: "planner"}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
@@ -45,6 +45,22 @@ def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, compl
     unchecked_kinds |= set() if complete else {"plan"}
     for state in states:
         _Checker(state, names, unchecked_kinds, possibly_stored, faults).check()
+
+
+def names_used(root: MachineSpec, kind: str) -> tuple[str, ...]:
+    """Returns the names of a kind in the options of a task's states, without duplicates.
+
+    Args:
+        root: Outermost machine.
+        kind: Kind of name, such as planner.
+    """
+    found: dict[str, None] = {}
+    for state in root.leaf_states():
+        for option in state.source.options.values():
+            if any(isinstance(use, Named) and use.kind == kind and not use.made for use in option.uses):
+                value = state.options.get(option.name, option.default)
+                found |= dict.fromkeys(str(name) for name in (value if isinstance(value, list) else [value]) if name)
+    return tuple(found)
 
 
 class _Checker:
@@ -112,18 +128,18 @@ class _Checker:
                 if self._inputs is not None and not self._inputs.intersection(keys):
                     self._need("input", keys[-1], f"option '{option}' 'userdata'", item.location)
                 continue
-            names = self._known.names.get(kind)
+            names = None if kind in self._unchecked_kinds else self._known.of_kind(kind)
             may_be_stored = name in self._possibly_stored and kind not in _NON_MESSAGE_KINDS
-            if names is not None and kind not in self._unchecked_kinds and name not in names and not may_be_stored:
+            if names is not None and name not in names and not may_be_stored:
                 self._faults.add(item.location, self._unknown(option, kind, name, names))
 
-    def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
+    def _unknown(self, option: str, kind: str, name: str, names: Collection[str]) -> str:
         word = _NON_MESSAGE_KINDS.get(kind, kind.replace("_", " "))
         text = (
             f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
             f"unknown; {listing(sorted(names), 'there is none')}"
         )
-        origin = self._known.origins.get(kind, "" if kind == "planner" else "the manager's file")
+        origin = self._known.origins.get(kind, "" if kind == PLANNER else "the manager's file")
         hint = nearest(name, sorted(names))
         if kind in _NON_MESSAGE_KINDS:
             return (

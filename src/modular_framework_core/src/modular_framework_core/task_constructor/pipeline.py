@@ -6,7 +6,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from modular_framework_core.files import default_folders
@@ -15,7 +16,7 @@ from modular_framework_core.task_constructor import generator, task_graph
 from modular_framework_core.task_constructor.explanation import explain, explain_template
 from modular_framework_core.task_constructor.generator import GenerationError
 from modular_framework_core.task_constructor.json_schema import task_schema
-from modular_framework_core.task_constructor.known_names import KnownNames, names_of_installation
+from modular_framework_core.task_constructor.known_names import KnownNames, PlannerNames, names_of_installation
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError
 from modular_framework_core.task_constructor.task_builder import load_task
 from modular_framework_core.task_constructor.task_graph import FORMATS, GraphError
@@ -85,8 +86,13 @@ def directories_from(text: str) -> list[Path]:
     return [Path(part).expanduser() for part in text.split(":") if part.strip()]
 
 
-def main(arguments: Sequence[str]) -> int:
+def main(arguments: Sequence[str], planners_of: Callable[[str], PlannerNames | None] = lambda package: None) -> int:
     """Runs the command ``state_machine_generator``.
+
+    Args:
+        arguments: Command-line arguments.
+        planners_of: Function that returns the planners of a MoveIt configuration package, "" for the package in the
+            API package's launch file; None if planners are not checked.
 
     Returns:
         Exit code: 0 for success, 1 for a fault in the task or its inputs, 2 for a wrong command line.
@@ -111,6 +117,7 @@ def main(arguments: Sequence[str]) -> int:
             return 0
         script = default_folders.task_script(args.script)
         known = names_of_installation(args.config, args.moveit_config)
+        known = known.with_planners(partial(planners_of, args.moveit_config))
         if args.check or args.graph:
             print(_checked(args, check_task(script, states, templates, known)))
         else:

@@ -39,10 +39,11 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 import smach
+from modular_framework_core.commander.ros_planner_names import planners_by_pipeline
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator, loading, pipeline
-from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
+from modular_framework_core.task_constructor.known_names import KnownNames, PlannerNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder
 from modular_framework_core.task_runner.ros_introspection import with_introspection
@@ -53,10 +54,12 @@ from modular_framework_core.task_runner.task_runner import (
     TaskRun,
     write_record,
 )
+from modular_framework_ros.calls import CallError
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
+from modular_framework_ros.start_up import start_timeout
 
 STOP_GRACE_S = 0.6
 """Time for running states to stop before the node exits without them [s]."""
@@ -375,11 +378,24 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 
 def _known_names() -> KnownNames:
-    """Returns the names in the configuration folder and in the robot's SRDF."""
+    """Returns the names in the configuration folder, in the robot's SRDF and of move_group."""
     config = _parameter("~config_directory")
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
-    return names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
+    names = names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
+    return names.with_planners(_planners)
+
+
+def _planners() -> PlannerNames:
+    """Returns the planners of move_group.
+
+    Raises:
+        TaskNotRun: move_group does not answer.
+    """
+    try:
+        return PlannerNames(planners_by_pipeline(start_timeout()))
+    except CallError as error:
+        raise TaskNotRun(f"the planners that the task names cannot be checked: {error}") from error
 
 
 def _directories(parameter: str) -> list[Path]:

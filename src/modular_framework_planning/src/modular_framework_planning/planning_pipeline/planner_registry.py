@@ -69,10 +69,15 @@ class PlannerRegistry:
         others = (f"{name}/{item}" for name, spec in self.specs.items() for item in self._planners(spec))
         return (*default_planners, *(name for name in others if name.partition("/")[0] != self.default))
 
-    def all_names(self) -> tuple[str, ...]:
-        """Returns all accepted names, as PLANNER and as PIPELINE/PLANNER."""
-        planners = [(name, item) for name, spec in self.specs.items() for item in self._planners(spec)]
-        return tuple(dict.fromkeys(text for name, item in planners for text in (item, f"{name}/{item}")))
+    def by_pipeline(self) -> dict[str, tuple[str, ...]]:
+        """Returns the planner names of each pipeline that loads; empty for a plugin that accepts any name."""
+        found: dict[str, tuple[str, ...]] = {}
+        for name, spec in self.specs.items():
+            try:
+                found[name] = self._planners(spec) if planner_ids(spec) else ()
+            except ModelError:
+                continue  # move_group skips a pipeline without plugin
+        return found
 
     def resolve(self, name: str, group: str = "", pipeline: str = "") -> ResolvedPlanner:
         """Returns the planner that a name refers to.

@@ -25,6 +25,7 @@ from modular_framework_benchmark.experiments.ros_controller_names import control
 from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 from modular_framework_core.launching.launch_arguments import check_arguments
+from modular_framework_core.launching.ros_installed_planners import installed_planners
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
 from modular_framework_core.task_constructor import pipeline
 
@@ -267,20 +268,22 @@ def in_controllers(old: str, new: str, words: str) -> Case:
     return Case("controller file", new, refused, words)
 
 
-def in_task(old: str, new: str, words: str) -> Case:
+def in_task(old: str, new: str, words: str, parameters: dict[str, Any] | None = None) -> Case:
     """Returns the case of a text in the task that an experiment names.
 
     Args:
         old: Correct text.
         new: Wrong text.
         words: Pattern of the refusal.
+        parameters: ROS parameters of the experiment besides those of TASK.
     """
 
     def refused(folder: Path) -> str:
         path = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
         text = (path / "pick_and_hold.yaml").read_text()
         (folder / "task.yaml").write_text(_replaced(text, old, new))
-        return experiment_faults({**TASK, "task": "task.yaml"}, folder)
+        own = {**TASK["parameters"], **(parameters or {})}
+        return experiment_faults({**TASK, "task": "task.yaml", "parameters": own}, folder)
 
     return Case("task of an experiment", new, refused, words)
 
@@ -301,7 +304,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
             (folder / "states" / "mine.py").write_text(state)
         printed = io.StringIO()
         with contextlib.redirect_stderr(printed):
-            code = pipeline.main([str(folder / "own.yaml"), str(folder / "states"), "--check"])
+            code = pipeline.main([str(folder / "own.yaml"), str(folder / "states"), "--check"], installed_planners)
         return printed.getvalue() if code else ""
 
     return Case("task script", text.split("\n")[0][:40], refused, words)
@@ -320,6 +323,24 @@ outcomes: [success]
 node_name: own
 states:
   - FIRST: {{source: mine, {option}outcomes: [success], transitions: {{success: success}}}}
+"""
+
+FIRST_STATE = "  - GenerateGrasps:"
+SET_PLANNER = """  - Choose:
+      {{source: set_planner, planner_id: {}, transitions: {{success: GenerateGrasps, fail: quit_pipeline}}}}
+"""
+PLANNER_TASK = """name: own
+source: framework_state_machine
+outcomes: [done, gave_up]
+states:
+  - A: {{source: set_planner, planner_id: {}, transitions: {{success: done, fail: gave_up}}}}
+"""
+STATE_TASK = """name: own
+source: framework_state_machine
+outcomes: [done, gave_up]
+states:
+  - A: {source: plan, target_state_type: joint_state, target_state_name: stability_pos, plan_name: p,
+        transitions: {success: done, fail: gave_up}}
 """
 
 CASES = [
@@ -455,6 +476,15 @@ CASES = [
     in_task("source: plan", "source: plann", "did you mean 'plan'"),
     in_task("target_state_type: joint_state", "target_state_type: joint_stat", "joint_state"),
     in_task("plan_name:", "plan_nam:", "did you mean 'plan_name'"),
+    in_task("hold_pose: stability_pose", "hold_pose: stability_pos", "'stability_pos' is unknown.*'stability_pose'"),
+    in_task(FIRST_STATE, f"{SET_PLANNER.format('BKPIECEE')}{FIRST_STATE}", "'BKPIECEE' is unknown.*'BKPIECE'"),
+    in_task(FIRST_STATE, f"{SET_PLANNER.format('pilz/LIN')}{FIRST_STATE}", "planner 'pilz/LIN' is unknown.*allowed"),
+    in_task(
+        FIRST_STATE,
+        f"{SET_PLANNER.format('RRT')}{FIRST_STATE}",
+        "planner 'RRT', which the task names: .*'goal_bias' is '2.0'",
+        {f"{PIPELINE}/planner_configs/RRT/goal_bias": 2.0},
+    ),
     # Other modes
     in_experiment(PLANNING, ("factors", "planner"), ["RRTConnect", "RTT"], "no planner 'RTT'.*did you mean 'RRT'"),
     in_experiment(PLANNING, ("pipeline",), "omple", "no pipeline 'omple'.*did you mean 'ompl'"),
@@ -536,6 +566,9 @@ CASES = [
     in_script(OWN_TASK.format(name="own", option="class: 3, "), "key 'class' is unknown", OWN_STATE),
     in_script(OWN_TASK.format(name="own", option="self: 3, "), "key 'self' is unknown", OWN_STATE),
     in_script(OWN_TASK.format(name="n" * 300, option=""), "has 300 characters; a file name may have 100", OWN_STATE),
+    in_script(PLANNER_TASK.format("BKPIECEE"), "planner 'BKPIECEE' is unknown.*did you mean 'BKPIECE'"),
+    in_script(PLANNER_TASK.format("omple/RRT"), "planner 'omple/RRT' is unknown.*did you mean 'ompl/RRT'"),
+    in_script(STATE_TASK, "joint state 'stability_pos' is unknown.*did you mean 'stability_pose'"),
     in_script(OWN_TASK.format(name="rospy", option=""), "is the Python module .*choose another name", OWN_STATE),
 ]
 
