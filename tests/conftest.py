@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish() -> None:
     """Keeps hypothesis from reading every imported module for constants, which takes each process up to 15 s."""
     if providers := sys.modules.get("hypothesis.internal.conjecture.providers"):
-        providers._get_local_constants = lambda: providers._local_constants
+        providers.is_local_module_file = lambda path: False
 
 
 @pytest.fixture(scope="session")
