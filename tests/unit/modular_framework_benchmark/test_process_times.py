@@ -8,10 +8,13 @@ import subprocess
 import sys
 import uuid
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from modular_framework_benchmark.episodes.process_times import processor_time_s
+from modular_framework_core.launching.launch_session import kill_processes_with
+from modular_framework_testing.ros_session import until
 
 BUSY_S, TICKS_S = 0.4, 0.06
 BUSY = f"import time\nwhile time.process_time() < {BUSY_S}: pass\n"
@@ -57,6 +60,27 @@ def test_the_whole_tree_of_a_node_counts_and_no_other_process(session: list[subp
     assert BUSY_S - TICKS_S <= processor_time_s(["/method_2"]) < used_s
     assert processor_time_s(["/other"]) == 0.0
     assert processor_time_s([]) == 0.0
+
+
+def test_a_daemon_of_a_method_counts(session: list[subprocess.Popen[str]], tmp_path: Path) -> None:
+    daemon = tmp_path / "daemon"
+    text = f"""
+import os
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        {BUSY.replace(chr(10), chr(10) + "        ")}
+        open({str(daemon)!r}, "w").write(str(os.getpid()))
+        time.sleep(60)
+    os._exit(0)
+os.wait()
+"""
+    session.append(started(text + "print('', flush=True); input()", "method"))
+    try:
+        until(daemon.is_file, "the daemon")
+        assert BUSY_S - TICKS_S <= processor_time_s(["/method"]) < BUSY_S + 1.0
+    finally:
+        kill_processes_with("ROS_HOME", os.environ["ROS_HOME"])
 
 
 def test_processes_of_another_session_do_not_count(

@@ -189,7 +189,10 @@ class EpisodeRecorder:
         started = request_service(START_SERVICE, Trigger, Trigger._request_class(), 30.0)
         if not started.success:
             raise WorldError(f"the task did not start: {started.message}")
-        self._wait(lambda: bool(self._samples.ends))
+        try:
+            self._wait(lambda: bool(self._samples.ends))
+        finally:  # also of an episode that is aborted at its time limit
+            answer["method_processor_s"] = processor_time_s(request.method_nodes) - answer["processor_before_s"]
         end = self._samples.ends[-1]
         if end["frozen"]:
             raise InterferenceError(end["frozen"])
@@ -200,7 +203,6 @@ class EpisodeRecorder:
             "task_wall_s": time.monotonic() - answer["requested_wall"],
             "task_s": self._now() - answer["zero"] - answer["requested_s"],
         }
-        answer["method_processor_s"] = processor_time_s(request.method_nodes) - answer["processor_before_s"]
         self._store_part_end(request, answer, "task")
 
     def _check(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
