@@ -11,11 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from modular_framework_benchmark.statistics import rates
 from modular_framework_benchmark.statistics.comparison import Interval
-from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval, paired_p_value, rate_interval
+from modular_framework_benchmark.statistics.rates import (
+    PairOutcomes,
+    paired_interval,
+    paired_p_value,
+    rate_interval,
+    score_interval,
+)
 
 Floats = NDArray[np.float64]
+IntervalOf = Callable[[PairOutcomes], Interval]
 ERROR = 0.05
 ROUNDING = 1e-9  # of the sum of up to 5,151 probabilities, and of a difference at the end of an interval
 NEAR_ZERO = (0.0, 0.001, 0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.04)
@@ -62,24 +68,18 @@ def swapped(interval: Interval) -> Interval:
     return Interval(-interval.high, -interval.low, interval.confidence, interval.method)
 
 
-def intervals_of(outcomes: list[PairOutcomes]) -> Floats:
+def intervals_of(outcomes: list[PairOutcomes], interval_of: IntervalOf = paired_interval) -> Floats:
     """Returns the ends of each outcome's interval, shape (outcomes, 2); half of them by exchanging the methods."""
     found = {}
     for item in outcomes:
         mirror = (item.lost, item.won)
-        found[item.won, item.lost] = swapped(found[mirror]) if mirror in found else paired_interval(item)
+        found[item.won, item.lost] = swapped(found[mirror]) if mirror in found else interval_of(item)
     return np.array([(found[item.won, item.lost].low, found[item.won, item.lost].high) for item in outcomes])
 
 
-def tango_intervals(outcomes: list[PairOutcomes]) -> Floats:
-    """Returns the ends of Tango's score interval of each outcome, also where a report prints another interval."""
-    max_outside, rates.MAX_OUTSIDE = rates.MAX_OUTSIDE, -1
-    paired_interval.cache_clear()
-    try:
-        return intervals_of(outcomes)
-    finally:
-        rates.MAX_OUTSIDE = max_outside
-        paired_interval.cache_clear()
+def tango_interval(outcomes: PairOutcomes) -> Interval:
+    """Returns Tango's score interval as published."""
+    return score_interval(outcomes, 1.0 - ERROR, correction=0.0)
 
 
 def covered(ends: Floats, probabilities: Floats) -> Floats:
@@ -135,7 +135,7 @@ def figures_of(pairs: int) -> dict[str, Extreme]:
         "rate": extreme(rate_coverage(pairs, printed_rate), pairs, np.argmin, RATES),
         "Wilson": extreme(rate_coverage(pairs, wilson), pairs, np.argmin, RATES),
     }
-    tango = tango_intervals(outcomes)
+    tango = intervals_of(outcomes, tango_interval)
     found["Tango alone"] = extreme(covered(tango, chances), pairs, np.argmin, grid())
     return found
 

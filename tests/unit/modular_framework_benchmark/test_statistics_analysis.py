@@ -58,7 +58,7 @@ def mean_of(metric: Metric, values: Sequence[float]) -> Estimate:
 
 def test_a_difference_that_is_shown_is_a_plain_sentence() -> None:
     (found,) = compare(pairs(120, 40, 16, 24))
-    assert found.sentence == "A succeeds more often than B (+12 points, 95 % interval 5 to 19, 200 paired episodes)"
+    assert found.sentence == "A succeeds more often than B (+12 points, 95 % interval 5 to 20, 200 paired episodes)"
     assert found.verdict is Verdict.FIRST_BETTER
     assert found.p_value == pytest.approx(2 * sum(math.comb(56, n) for n in range(17)) / 2**56)
     assert found.test == "McNemar's exact test"
@@ -67,7 +67,7 @@ def test_a_difference_that_is_shown_is_a_plain_sentence() -> None:
 
 def test_the_better_method_comes_first_and_its_difference_has_its_sign() -> None:
     (found,) = compare(pairs(120, 16, 40, 24))
-    assert found.sentence == "B succeeds more often than A (+12 points, 95 % interval 5 to 19, 200 paired episodes)"
+    assert found.sentence == "B succeeds more often than A (+12 points, 95 % interval 5 to 20, 200 paired episodes)"
     assert found.verdict is Verdict.SECOND_BETTER
     assert found.difference is not None
     assert found.difference.value == pytest.approx(-0.12)
@@ -76,7 +76,7 @@ def test_the_better_method_comes_first_and_its_difference_has_its_sign() -> None
 def test_a_difference_that_is_not_shown_says_how_many_pairs_would_show_5_points() -> None:
     (found,) = compare(pairs(40, 6, 5, 9))
     assert found.sentence.startswith(
-        "no difference in success shown between A and B (+2 points, 95 % interval -10 to 14"
+        "no difference in success shown between A and B (+2 points, 95 % interval -11 to 14"
     )
     assert found.sentence.endswith(f"; {found.pairs_needed} paired episodes would show 5 points")
     assert found.pairs_needed is not None
@@ -221,7 +221,7 @@ def test_broken_episodes_count_as_failures_and_what_they_decide_is_told() -> Non
     assert found.verdict_without_broken is Verdict.NOT_SHOWN
     assert found.notes == (
         "8 broken episodes counted as failures; without their pairs the verdict changes "
-        "(0 points, 95 % interval -24 to 24, 12 paired episodes)",
+        "(0 points, 95 % interval -30 to 30, 12 paired episodes)",
     )
     of_b = next(each for each in summarise(results_of(statuses)) if each.method == "B")
     assert of_b.counts.broken == 8
@@ -323,7 +323,7 @@ def test_methods_without_a_common_trial_are_paired_at_random() -> None:
     (found,) = compare(results)
     assert (found.counts.pairs, found.counts.won, found.counts.at_random) == (40, 20, True)
     assert found.sentence == (
-        "A succeeds more often than B (+50 points, 95 % interval 35 to 65, 40 pairs of any two episodes)"
+        "A succeeds more often than B (+50 points, 95 % interval 34 to 66, 40 pairs of any two episodes)"
     )
 
 

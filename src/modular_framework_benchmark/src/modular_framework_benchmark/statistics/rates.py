@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,6 +16,9 @@ from modular_framework_benchmark.statistics.comparison import Interval
 
 MAX_OUTSIDE = 3
 """Number of units outside the most frequent outcome up to which Tango's interval covers too little (down to 83 %)."""
+
+CORRECTION = 0.5
+"""Continuity correction of Tango's score [pairs]: without it the coverage of 95 % falls to 92.2 % at 21 pairs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,38 +66,49 @@ def paired_p_value(outcomes: PairOutcomes) -> float:
 def paired_interval(outcomes: PairOutcomes, confidence: float = 0.95) -> Interval:
     """Returns the confidence interval of a win difference, which for a rate is the paired difference of two rates.
 
-    Tango's score interval contains every difference that the score test does not reject; at a difference of 0 the test
-    is McNemar's. If at most `MAX_OUTSIDE` pairs lie outside the larger of won and lost, the interval is the difference
-    of two Clopper-Pearson intervals with half of the error each.
-    Source: T. Tango, Equivalence test and confidence interval for the difference in proportions for the paired-sample
-    design, Statistics in Medicine 17 (1998) 891-908.
+    It is Tango's score interval. If at most `MAX_OUTSIDE` pairs lie outside the larger of won and lost, the interval is
+    the difference of two Clopper-Pearson intervals with half of the error each.
     """
     if outcomes.pairs - max(outcomes.won, outcomes.lost) <= MAX_OUTSIDE:
         won, lost = (
             rate_interval(count, outcomes.pairs, (1 + confidence) / 2) for count in (outcomes.won, outcomes.lost)
         )
         return Interval(won.low - lost.high, won.high - lost.low, confidence, "two Clopper-Pearson intervals")
-    low, high = _score_limits(outcomes, confidence)
-    return Interval(low, high, confidence, "Tango's score interval")
+    return score_interval(outcomes, confidence)
 
 
-def _score_limits(outcomes: PairOutcomes, confidence: float) -> tuple[float, float]:
+def score_interval(outcomes: PairOutcomes, confidence: float, correction: float = CORRECTION) -> Interval:
+    """Returns Tango's score interval: every difference that the score test does not reject.
+
+    At a difference of 0 the score test is McNemar's.
+    Source: T. Tango, Equivalence test and confidence interval for the difference in proportions for the paired-sample
+    design, Statistics in Medicine 17 (1998) 891-908.
+
+    Args:
+        outcomes: Numbers of won and lost pairs.
+        confidence: Confidence level.
+        correction: Continuity correction [pairs]; Tango's own interval has 0.
+    """
     critical = float(stats.norm.isf((1 - confidence) / 2))
     estimate = outcomes.difference
 
+    def excess(difference: float) -> float:
+        return abs(_score(outcomes, difference, correction)) - critical
+
     def root(end: float) -> float:
-        if estimate == end:
+        # The score is 0 at the estimate. At an end that was not observed it diverges, unless the pairs are few.
+        if estimate == end or excess(end) <= 0.0:
             return end
-        # The score is 0 at the estimate and diverges to minus infinity at an end that was not observed.
-        return float(optimize.brentq(lambda shift: abs(_score(outcomes, shift)) - critical, estimate, end))
+        return float(optimize.brentq(excess, estimate, end))
 
-    return root(-1.0), root(1.0)
+    return Interval(root(-1.0), root(1.0), confidence, "Tango's score interval")
 
 
-def _score(outcomes: PairOutcomes, difference: float) -> float:
-    """Returns Tango's score statistic of a difference [standard deviations]."""
+def _score(outcomes: PairOutcomes, difference: float, correction: float) -> float:
+    """Returns Tango's score statistic of a difference, with a continuity correction [standard deviations]."""
     won, lost, pairs = outcomes.won, outcomes.lost, outcomes.pairs
-    deviation = won - lost - pairs * difference
+    shift = won - lost - pairs * difference
+    deviation = math.copysign(max(abs(shift) - correction, 0.0), shift)
     if deviation == 0.0:
         return 0.0
     linear = -won - lost + (2 * pairs - won + lost) * difference
