@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -20,7 +22,7 @@ from modular_framework_planning.collision_detection.exact_collision_checker impo
 from modular_framework_planning.collision_detection.kernels.compiled_penetration import TOUCH_COST_M
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ModelError, PlanningError
-from modular_framework_planning.geometry.shapes import Box, Cylinder, Sphere
+from modular_framework_planning.geometry.shapes import Box, Cylinder, Plane, Sphere
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.stomp.costs import collision_costs
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
@@ -242,6 +244,31 @@ def test_distance(cell: Cell, make: Make) -> None:
     for state in cell.states(SLOW_STATES):
         ours, theirs = checker.distance(state), judge.distance(state)
         assert abs(ours - theirs) < SAME_DISTANCE or (ours <= 0.0 and theirs <= 0.0)
+
+
+def test_bodies_far_away_add_no_exact_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+    near = small_scene()
+    far = near.with_object(thing("ground", Plane(0.0, 0.0, 1.0, 0.0), 0.0, 0.0, -5.0))
+    for index in range(10):
+        far = far.with_object(thing(f"far_{index}", Sphere(0.1), 5.0, index, 0.0))
+    computed: list[object] = []
+    coal_distance = coal.distance
+
+    def counted_distance(first: Any, *arguments: Any) -> float:
+        if not isinstance(first, coal.Plane):  # the distance of a sphere from a plane is a bound
+            computed.append(first)
+        return coal_distance(first, *arguments)
+
+    state = near.model.default_positions()
+    expected = PlainCoalChecker(far).distance(state)
+    monkeypatch.setattr(coal, "distance", counted_distance)
+    distances, counts = [], []
+    for scene in (near, far):
+        computed.clear()
+        distances.append(ExactCollisionChecker(scene).distance(state))
+        counts.append(len(computed))
+    assert distances == pytest.approx([expected] * 2, abs=SAME_DISTANCE)
+    assert 0 < counts[0] == counts[1]
 
 
 def test_only_pairs_that_the_moving_joints_change_count(cell: Cell, make: Make) -> None:
