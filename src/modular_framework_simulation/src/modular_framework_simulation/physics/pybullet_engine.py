@@ -38,6 +38,7 @@ from modular_framework_simulation.physics.physics_engine import (
 )
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.pybullet_rest import Rest
+from modular_framework_simulation.physics.pybullet_store import BodyStore
 from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_simulation.physics.surfaces import softness_of
 from modular_framework_urdf import xml_text
@@ -108,7 +109,7 @@ class PyBulletEngine(PhysicsEngine):
                 "this build of the physics engine multiplies friction and restitution coefficients, so a contact "
                 "between different surfaces uses their geometric mean instead of the smaller coefficient"
             )
-        self._rest = Rest(self.api, self.client, settings)
+        self._forget_bodies()
         self._impossible_moments: dict[int, dict[int, list[float]]] = {}  # by body and link
         self._free_masses: dict[int, float] = {}  # of bodies without joints [kg]
         self._iterations_fit = True  # to the masses; fitted before a step, not for each of many new bodies
@@ -186,47 +187,60 @@ class PyBulletEngine(PhysicsEngine):
         self.api.resetSimulation(physicsClientId=self.client)
         self._impossible_moments.clear()
         self._free_masses.clear()
-        self._rest = Rest(self.api, self.client, self.settings)
+        self._forget_bodies()
         self._configure(gravity)
+
+    def _forget_bodies(self) -> None:
+        self._store = BodyStore(self.api, self.client, lambda text: self._load_text(text, False, 0))
+        self._rest = Rest(self.api, self.client, self.settings, self._store)
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
         """Loads a body; see `PhysicsEngine`."""
         flags = self.api.URDF_USE_SELF_COLLISION if self_collision else 0
-        flags |= self.api.URDF_USE_IMPLICIT_CYLINDER  # the default has 32 sides and rolls unevenly
         text = with_rims(text, name)
         refuse_long_names(text, f"model '{name[:MAX_SHOWN_CHARACTERS]}'")
-        # The engine caches files by name, so each body needs its own file.
-        self._files_written += 1
-        file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
-        file.write_text(text, encoding="utf-8")
         try:
-            with _silenced():
-                body: int = self.api.loadURDF(
-                    str(file),
-                    useFixedBase=fixed,
-                    # SAT features allow boxes and hulls to have up to four contact points at once instead of one.
-                    flags=flags | self.api.URDF_USE_INERTIA_FROM_FILE | self.api.URDF_INITIALIZE_SAT_FEATURES,
-                    physicsClientId=self.client,
-                )
-            file.unlink()
+            body = self._store.add(self._load_text(text, fixed, flags))
         except self.api.error as error:
             problem = f"is rejected by the physics engine ({error})"
             raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
         self._set_dropped_moments(body, text)
-        has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
+        infos = self.joint_infos(body)
+        has_joints = any(info[2] != self.api.JOINT_FIXED for info in infos)
         self._rest.add(body, fixed, has_joints)
-        mass: float = self.api.getDynamicsInfo(body, BASE_INDEX, physicsClientId=self.client)[0]
+        if not (fixed or infos or self.has_window or body in self._impossible_moments):
+            self._store.keep_text(body, text)
+        mass: float = self.api.getDynamicsInfo(self._id(body), BASE_INDEX, physicsClientId=self.client)[0]
         if not fixed and not has_joints and mass > 0.0:
             self._free_masses[body] = mass
             self._iterations_fit = False
         return body
+
+    def _load_text(self, text: str, fixed: bool, flags: int) -> int:
+        """Loads a URDF; returns the engine's id of the body."""
+        # The engine caches files by name, so each body needs its own file.
+        self._files_written += 1
+        file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
+        file.write_text(text, encoding="utf-8")
+        # A cylinder has 32 sides by default and rolls unevenly. SAT features allow boxes and hulls to have up to four
+        # contact points at once instead of one.
+        flags |= self.api.URDF_USE_IMPLICIT_CYLINDER | self.api.URDF_USE_INERTIA_FROM_FILE
+        flags |= self.api.URDF_INITIALIZE_SAT_FEATURES
+        with _silenced():
+            body: int = self.api.loadURDF(str(file), useFixedBase=fixed, flags=flags, physicsClientId=self.client)
+        file.unlink()
+        return body
+
+    def _id(self, number: int) -> int:
+        """Returns the engine's id of a body, which is loaded again if it is stored."""
+        return self._rest.body_id(number)
 
     def _set_dropped_moments(self, body: int, text: str) -> None:
         """Sets moments of inertia that the loader replaced by 0, because no rigid body has them."""
         names = [self.root_link(body), *(joint.child_link for joint in self.joints(body))]
         dropped = {}
         for index, name in enumerate(names, BASE_INDEX):
-            mass, _, moments, *_ = self.api.getDynamicsInfo(body, index, physicsClientId=self.client)
+            mass, _, moments, *_ = self.api.getDynamicsInfo(self._id(body), index, physicsClientId=self.client)
             if mass > 0.0 and not any(moments):
                 dropped[name] = index
         for link in xml_text.parse(text, f"body {body}").findall("link") if dropped else ():
@@ -238,13 +252,14 @@ class PyBulletEngine(PhysicsEngine):
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
         """Returns the engine's records of all joints of a body, sorted by index."""
-        count = self.api.getNumJoints(body, physicsClientId=self.client)
-        return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
+        count = self.api.getNumJoints(self._id(body), physicsClientId=self.client)
+        return [self.api.getJointInfo(self._id(body), index, physicsClientId=self.client) for index in range(count)]
 
     def step(self) -> None:
         """Advances the physics by one time step."""
         if not self._iterations_fit:
             self._fit_iterations()
+        self._rest.before_step()
         self.api.stepSimulation(physicsClientId=self.client)
         self._rest.after_step()
 
@@ -286,13 +301,14 @@ class PyBulletEngine(PhysicsEngine):
         self._rest.wake_touching(number)
         self._rest.remove(number)
         self._impossible_moments.pop(number, None)
-        self.api.removeBody(number, physicsClientId=self.client)
+        self.api.removeBody(self._id(number), physicsClientId=self.client)
+        self._store.remove(number)
         if self._free_masses.pop(number, None) is not None:
             self._iterations_fit = False
 
     def root_link(self, number: int) -> str:
         """Returns the name of the root link."""
-        name: str = self.api.getBodyInfo(number, physicsClientId=self.client)[0].decode()
+        name: str = self.api.getBodyInfo(self._id(number), physicsClientId=self.client)[0].decode()
         return name
 
     def joints(self, number: int) -> list[EngineJoint]:
@@ -323,32 +339,33 @@ class PyBulletEngine(PhysicsEngine):
 
     def mass_properties(self, number: int, index: int) -> MassProperties:
         """Returns the mass properties of a link."""
-        record = self.api.getDynamicsInfo(number, index, physicsClientId=self.client)
+        record = self.api.getDynamicsInfo(self._id(number), index, physicsClientId=self.client)
         return MassProperties(record[0], record[2], Pose(tuple(record[3]), tuple(record[4])))
 
     def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
         """Returns the joint space inertia matrix; see `PhysicsEngine`."""
-        states = self.api.getJointStates(number, indices, physicsClientId=self.client)
+        states = self.api.getJointStates(self._id(number), indices, physicsClientId=self.client)
         positions = [state[0] for state in states]
         # The engine rejects moments that no rigid body has; their mean is used instead.
         impossible = self._impossible_moments.get(number, {})
         for index, moments in impossible.items():
             self._set_moments(number, index, [sum(moments) / 3.0] * 3)
-        matrix = np.array(self.api.calculateMassMatrix(number, positions, physicsClientId=self.client))
+        matrix = np.array(self.api.calculateMassMatrix(self._id(number), positions, physicsClientId=self.client))
         for index, moments in impossible.items():
             self._set_moments(number, index, moments)
         return matrix
 
     def _set_moments(self, number: int, index: int, moments: Sequence[float]) -> None:
-        self.api.changeDynamics(number, index, localInertiaDiagonal=moments, physicsClientId=self.client)
+        self._set_dynamics(number, index, localInertiaDiagonal=moments)
 
     def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
         """Sets the pairs of links that collide."""
-        every = range(BASE_INDEX, self.api.getNumJoints(number, physicsClientId=self.client))
+        body = self._id(number)
+        every = range(BASE_INDEX, self.api.getNumJoints(body, physicsClientId=self.client))
         for a in every:
             for b in range(a + 1, every.stop):
                 enable = int(frozenset((a, b)) in allowed)
-                self.api.setCollisionFilterPair(number, number, a, b, enable, physicsClientId=self.client)
+                self.api.setCollisionFilterPair(body, body, a, b, enable, physicsClientId=self.client)
 
     def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
         """Sets friction, bounce and softness of a link."""
@@ -359,7 +376,7 @@ class PyBulletEngine(PhysicsEngine):
         if surface.restitution > 0.0:
             # Otherwise, the engine slows a body down just before the contact, which changes the impact velocity.
             options["contactProcessingThreshold"] = 0.0
-        self.api.changeDynamics(
+        self._set_dynamics(
             number,
             index,
             lateralFriction=self.engine_coefficient(surface.lateral),
@@ -368,7 +385,6 @@ class PyBulletEngine(PhysicsEngine):
             restitution=self.engine_coefficient(surface.restitution),
             frictionAnchor=int(anchored),
             **options,
-            physicsClientId=self.client,
         )
 
     def _softness(self, surface: Surface) -> tuple[float, float] | None:
@@ -381,46 +397,50 @@ class PyBulletEngine(PhysicsEngine):
 
     def remove_margin(self, number: int, index: int) -> None:
         """Removes the collision margin, with which cylinders and meshes float a millimetre above a table."""
-        self.api.changeDynamics(number, index, collisionMargin=0.0, physicsClientId=self.client)
+        self._set_dynamics(number, index, collisionMargin=0.0)
 
     def remove_velocity_damping(self, number: int) -> None:
         """Removes the engine's default velocity damping of 4 % per second."""
-        self.api.changeDynamics(
-            number,
-            BASE_INDEX,
-            linearDamping=0.0,
-            angularDamping=0.0,
-            maxJointVelocity=_MAX_VELOCITY,
-            physicsClientId=self.client,
-        )
+        self._set_dynamics(number, BASE_INDEX, linearDamping=0.0, angularDamping=0.0, maxJointVelocity=_MAX_VELOCITY)
+
+    def _set_dynamics(self, number: int, index: int, **options: Any) -> None:
+        self._store.note(number, options)
+        self.api.changeDynamics(self._id(number), index, **options, physicsClientId=self.client)
 
     def base_centre(self, number: int) -> Pose:
         """Returns the pose of the root link's centre of mass."""
-        return Pose(*self.api.getBasePositionAndOrientation(number, physicsClientId=self.client))
+        stored = self._store.stored.get(number)
+        if stored is not None:
+            return stored
+        return Pose(*self.api.getBasePositionAndOrientation(self._id(number), physicsClientId=self.client))
 
     def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
         """Returns linear and angular velocity of the root link's centre of mass."""
-        linear, angular = self.api.getBaseVelocity(number, physicsClientId=self.client)
+        if number in self._store.stored:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        linear, angular = self.api.getBaseVelocity(self._id(number), physicsClientId=self.client)
         return linear, angular
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
         """Sets the pose of the root link's centre of mass, with the root link at rest."""
         self._rest.wake_touching(number)
         self._rest.wake(number)
-        self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
+        self.api.resetBasePositionAndOrientation(
+            self._id(number), pose.position, pose.quaternion, physicsClientId=self.client
+        )
         self._rest.wake_near(number)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
         """Sets the velocity of the root link's centre of mass."""
 
         def set_velocity() -> None:
-            self.api.resetBaseVelocity(number, linear, angular, physicsClientId=self.client)
+            self.api.resetBaseVelocity(self._id(number), linear, angular, physicsClientId=self.client)
 
         self._rest.disturb(number, set_velocity)
 
     def link_motion(self, number: int, index: int) -> LinkMotion:
         """Returns pose and velocity of a link."""
-        record = self.api.getLinkState(number, index, 1, 1, physicsClientId=self.client)
+        record = self.api.getLinkState(self._id(number), index, 1, 1, physicsClientId=self.client)
         return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])
 
     def weld(self, number: int, index: int, other: int) -> int:
@@ -428,9 +448,9 @@ class PyBulletEngine(PhysicsEngine):
         link = self.base_centre(number) if index == BASE_INDEX else self.link_motion(number, index).centre
         other_in_link = link.inverse() @ self.base_centre(other)
         weld: int = self.api.createConstraint(
-            number,
+            self._id(number),
             index,
-            other,
+            self._id(other),
             BASE_INDEX,
             self.api.JOINT_FIXED,
             (0.0, 0.0, 0.0),
@@ -450,43 +470,53 @@ class PyBulletEngine(PhysicsEngine):
         """Applies a force [N] at a point of a link [m] in the next step."""
 
         def apply() -> None:
-            self.api.applyExternalForce(number, index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client)
+            self.api.applyExternalForce(
+                self._id(number), index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client
+            )
 
         self._rest.disturb(number, apply)
 
     def touches(self, number: int, index: int) -> list[Touch]:
         """Returns the contacts of a link with other bodies."""
-        points = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
-        return [Touch(point[2], point[9], point[8]) for point in points if point[2] != number]
+        touches = [Touch(self._store.number(point[2]), point[9], point[8]) for point in self._contacts(number, index)]
+        return [touch for touch in touches if touch.other != number]
 
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link, with forces."""
-        records = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
-        return [_contact(record) for record in records if record[9] > 0.0 or record[8] <= 0.0]
+        records = [record for record in self._contacts(number, index) if record[9] > 0.0 or record[8] <= 0.0]
+        return [_contact(record, self._store.number(record[2])) for record in records]
+
+    def _contacts(self, number: int, index: int) -> tuple[tuple[Any, ...], ...]:
+        """Returns the engine's records of the contact points of a link, whose neighbours are not stored any more."""
+        self._rest.watch(number)
+        records: tuple[tuple[Any, ...], ...] = self.api.getContactPoints(
+            bodyA=self._id(number), linkIndexA=index, physicsClientId=self.client
+        )
+        return records
 
     def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
         """Returns the states of joints."""
-        records = self.api.getJointStates(number, indices, physicsClientId=self.client)
+        records = self.api.getJointStates(self._id(number), indices, physicsClientId=self.client)
         return [JointState(record[0], record[1], record[3]) for record in records]
 
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
         """Sets position and velocity of a joint."""
         self._rest.wake_touching(number)
-        self.api.resetJointState(number, index, position, velocity, physicsClientId=self.client)
+        self.api.resetJointState(self._id(number), index, position, velocity, physicsClientId=self.client)
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
         """Returns rotation and angular velocity of a ball joint."""
-        turn, rate = self.api.getJointStateMultiDof(number, index, physicsClientId=self.client)[:2]
+        turn, rate = self.api.getJointStateMultiDof(self._id(number), index, physicsClientId=self.client)[:2]
         return turn, rate
 
     def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
         """Sets rotation and angular velocity of a ball joint."""
-        self.api.resetJointStateMultiDof(number, index, turn, rate, physicsClientId=self.client)
+        self.api.resetJointStateMultiDof(self._id(number), index, turn, rate, physicsClientId=self.client)
 
     def release_ball_joint(self, number: int, index: int) -> None:
         """Removes the engine's default motor of a ball joint."""
         self.api.setJointMotorControlMultiDof(
-            number,
+            self._id(number),
             index,
             self.api.POSITION_CONTROL,
             targetPosition=[0.0, 0.0, 0.0, 1.0],
@@ -498,7 +528,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_joint_damping(self, number: int, index: int, damping: float) -> None:
         """Sets the viscous damping of a joint."""
-        self.api.changeDynamics(number, index, jointDamping=damping, physicsClientId=self.client)
+        self._set_dynamics(number, index, jointDamping=damping)
 
     def set_position_motors(
         self,
@@ -512,7 +542,7 @@ class PyBulletEngine(PhysicsEngine):
     ) -> None:
         """Sets motors that move joints to positions; see `PhysicsEngine`."""
         self.api.setJointMotorControlArray(
-            number,
+            self._id(number),
             indices,
             self.api.POSITION_CONTROL,
             targetPositions=targets,
@@ -526,7 +556,7 @@ class PyBulletEngine(PhysicsEngine):
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
         """Sets a motor that moves a joint at a velocity."""
         self.api.setJointMotorControl2(
-            number,
+            self._id(number),
             index,
             self.api.VELOCITY_CONTROL,
             targetVelocity=velocity,
@@ -538,13 +568,13 @@ class PyBulletEngine(PhysicsEngine):
     def apply_effort(self, number: int, index: int, effort: float) -> None:
         """Applies an effort to a joint in the next step."""
         self.api.setJointMotorControl2(
-            number, index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
+            self._id(number), index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
         )
 
     def measure_joint_load(self, number: int, index: int) -> None:
         """Enables the measurement of the load on a joint."""
         self._rest.keep_awake(number)
-        self.api.enableJointForceTorqueSensor(number, index, True, physicsClientId=self.client)
+        self.api.enableJointForceTorqueSensor(self._id(number), index, True, physicsClientId=self.client)
 
     def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
         """Returns the load of the child link on the parent link of a joint; see `PhysicsEngine`.
@@ -552,9 +582,9 @@ class PyBulletEngine(PhysicsEngine):
         The engine measures the load of the parent link on the child link, at the centre of mass and in the inertia
         frame of the child link, without the effort of the motor along the joint axis.
         """
-        info = self.api.getJointInfo(number, index, physicsClientId=self.client)
-        _, _, reaction, motor = self.api.getJointState(number, index, physicsClientId=self.client)
-        record = self.api.getLinkState(number, index, physicsClientId=self.client)
+        info = self.api.getJointInfo(self._id(number), index, physicsClientId=self.client)
+        _, _, reaction, motor = self.api.getJointState(self._id(number), index, physicsClientId=self.client)
+        record = self.api.getLinkState(self._id(number), index, physicsClientId=self.client)
         centre_in_link = Pose(record[2], record[3])
         x, y, z = info[13]  # axis in the inertia frame of the link
         along_axis = (motor * x, motor * y, motor * z)
@@ -566,13 +596,18 @@ class PyBulletEngine(PhysicsEngine):
         return _negative(force), _negative(about_origin)
 
 
-def _contact(record: tuple[Any, ...]) -> EngineContact:
-    """Converts a record of the engine's contact points."""
+def _contact(record: tuple[Any, ...], other: int) -> EngineContact:
+    """Converts a record of the engine's contact points.
+
+    Args:
+        record: The engine's record.
+        other: Number of the other body.
+    """
     on_first, on_other, (nx, ny, nz) = record[5], record[6], record[7]
     px, py, pz = ((a + b) / 2 for a, b in zip(on_first, on_other, strict=True))
     forces = ((record[9], record[7]), (record[10], record[11]), (record[12], record[13]))
     fx, fy, fz = (sum(size * direction[axis] for size, direction in forces) for axis in range(3))
-    return EngineContact(record[2], record[4], (px, py, pz), (nx, ny, nz), record[8], (fx, fy, fz))
+    return EngineContact(other, record[4], (px, py, pz), (nx, ny, nz), record[8], (fx, fy, fz))
 
 
 def _negative(vector: Vector3) -> Vector3:
