@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
-
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.models.mesh_files import load_mesh
+from modular_framework_simulation.models.model_extents import reach
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
@@ -48,15 +45,14 @@ def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
     Raises:
         DescriptionError: See `resting_height`.
     """
-    rotated = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0))
-    lowest = [
-        _lowest_height(rotated @ link.pose @ collision.pose, collision.geometry)
-        for link in _read(model).links
-        for collision in link.collisions
-    ]
-    if not lowest:
+    spec = _read(model)
+    shapes = [collision.geometry for link in spec.links for collision in link.collisions]
+    if not shapes:
         raise DescriptionError(str(model), "got no <collision>", "allowed: a model with one; give z instead of on")
-    return min(lowest)
+    if any(isinstance(shape, specs.Plane) for shape in shapes):
+        raise DescriptionError("<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on")
+    to_model = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0)).inverse()
+    return -reach(spec, rotate_vector(to_model.quaternion, (0.0, 0.0, -1.0)))
 
 
 @lru_cache(maxsize=64)
@@ -68,22 +64,3 @@ def _read(model: Path) -> specs.Model:
             str(model), f"got a file that cannot be read ({error})", "allowed: an SDF file"
         ) from error
     return read_model_text(text, str(model), Resources((model.parent.parent,), no_packages))
-
-
-def _lowest_height(pose: Pose, shape: specs.Geometry) -> float:
-    """Returns the height of a shape's lowest point: height of its frame minus its downward extent [m]."""
-    down = [rotate_vector(pose.quaternion, axis)[2] for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-    match shape:
-        case specs.Sphere():
-            extent = shape.radius
-        case specs.Box():
-            extent = sum(abs(cosine) * size / 2 for cosine, size in zip(down, shape.size, strict=True))
-        case specs.Cylinder():
-            extent = abs(down[2]) * shape.length / 2 + shape.radius * math.sqrt(max(0.0, 1 - down[2] ** 2))
-        case specs.Mesh():
-            extent = -float(np.min(np.asarray(load_mesh(shape).vertices) @ np.asarray(down)))
-        case _:
-            raise DescriptionError(
-                "<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on"
-            )
-    return pose.position[2] - extent
