@@ -54,6 +54,7 @@ STEP_TIME = "/gazebo/step_time"
 RESTART = "/gazebo/restart"
 STATE_DIGEST = "/gazebo/state_digest"
 REFEREE = "/gazebo/referee"
+RECORD_WORLD = "/gazebo/record_world"
 READ_ONLY_PREFIX = "/get_"
 """Part of the names of services that do not change the world."""
 

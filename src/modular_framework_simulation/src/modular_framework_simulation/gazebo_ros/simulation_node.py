@@ -219,6 +219,7 @@ class SimulationNode:
         if self._visible is not None:
             self._loop.add_hook(Hook(period_ns(_STATES_RATE_HZ), self._visible.publish))
         self._loop.add_hook(Hook(period_ns(_GRASP_RATE_HZ), self._watch_grasps))
+        self._loop.add_hook(Hook(period_ns(_STATES_RATE_HZ), self._loop.record.sample))
         self._loop.add_hook(Hook(period_ns(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
         self._loop.add_hook(Hook(0, self._sensors.tick))
         self._loop.add_hook(Hook(period_ns(_SNAPSHOT_RATE_HZ), self._publish_snapshot))

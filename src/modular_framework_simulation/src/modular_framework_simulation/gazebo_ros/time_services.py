@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services that hold and advance simulated time, restart the world, and return the referee's records."""
+"""Services that hold and advance simulated time, restart the world, and return records of the world."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import rospy
 from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeResponse, HoldTime, HoldTimeResponse
-from std_srvs.srv import Trigger, TriggerResponse
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
@@ -33,7 +33,7 @@ _MIN_REAL_TIME_FACTOR = 0.02
 
 
 class TimeServices:
-    """Serves /gazebo/{hold,advance,step}_time and /gazebo/{restart,referee,state_digest}.
+    """Serves /gazebo/{hold,advance,step}_time and /gazebo/{restart,referee,record_world,state_digest}.
 
     Args:
         loop: The simulation loop.
@@ -68,6 +68,7 @@ class TimeServices:
             (ros_names.STEP_TIME, AdvanceTime, self._on_step),
             (ros_names.RESTART, Trigger, self._on_restart),
             (ros_names.REFEREE, Trigger, self._on_referee),
+            (ros_names.RECORD_WORLD, SetBool, self._on_record),
         ):
             self._services.append(rospy.Service(name, kind, response))
         if self._digest is not None:
@@ -169,10 +170,14 @@ class TimeServices:
         return TriggerResponse(success=True, message="the world is in its initial state")
 
     def _on_referee(self, _request: Any) -> TriggerResponse:
-        """Returns the held objects, the poses of all models (x, y, z [m], xyzw) and the interventions as JSON."""
+        """Returns the held objects, the poses of all models (x, y, z [m], xyzw) and the interventions as JSON.
+
+        A running record gets a sample of the same moment.
+        """
         world = self._loop.world
 
         def read() -> dict[str, Any]:
+            self._loop.record.sample()
             poses = {name: world.body(name).state().pose for name in world.names()}
             return {
                 "held": sorted({held.model for held in self._loop.held_objects()}),
@@ -184,6 +189,21 @@ class TimeServices:
             return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, read)))
         except SimulationError as error:
             return TriggerResponse(success=False, message=str(error))
+
+    def _on_record(self, request: Any) -> SetBoolResponse:
+        """Starts a record of the world (`data` true), or ends the record and returns it as JSON.
+
+        The referee notes each call, so that only the node that placed the objects can start or end the record unseen.
+        """
+        record = self._loop.record
+        try:
+            self._loop.referee.note(ros_names.RECORD_WORLD, caller_of(request))
+            if request.data:
+                self._in_loop(ros_names.RECORD_WORLD, record.start)
+                return SetBoolResponse(success=True, message="the record of the world has started")
+            return SetBoolResponse(success=True, message=json.dumps(self._in_loop(ros_names.RECORD_WORLD, record.stop)))
+        except SimulationError as error:
+            return SetBoolResponse(success=False, message=str(error))
 
     def _on_digest(self, _request: Any) -> TriggerResponse:
         digest = self._digest

@@ -15,6 +15,7 @@ from modular_framework_simulation.loop.referee import Referee
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.snapshots import HeldObject
 from modular_framework_simulation.loop.time_holds import TimeHolds
+from modular_framework_simulation.loop.world_record import WorldRecord
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.model_changes import set_joint_positions
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -99,6 +100,7 @@ class SimulationLoop:
         self.referee = Referee(world)
         self._actors = actors
         self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
+        self.record = WorldRecord(world, lambda: {watch.held for watch in self.grasp_watches if watch.held is not None})
         self._hooks: list[Hook] = []
         self._hook_periods: list[int] = []
         self._on_paused_tick = on_paused_tick

@@ -321,6 +321,12 @@ class MujocoEngine(PhysicsEngine):
                 found.append(Touch(other, float(forces[row]), float(distances[row])))
         return found
 
+    def touched(self, number: int) -> set[int]:
+        """Returns the bodies that a body presses on."""
+        bodies, forces, _ = self._dynamics.contacts()
+        sides = self._body_id_of[bodies[forces > 0.0]]
+        return {int(side) for pair in sides if number in pair for side in pair if side not in (-1, number)}
+
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link, with forces."""
         bodies, _, distances = self._dynamics.contacts()

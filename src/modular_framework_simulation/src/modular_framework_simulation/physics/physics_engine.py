@@ -350,6 +350,10 @@ class PhysicsEngine(ABC):
         """Returns the contacts of a link with other bodies in the last step; a near body has force 0."""
 
     @abstractmethod
+    def touched(self, number: int) -> set[int]:
+        """Returns the ids of the bodies that any link of a body pressed on in the last step."""
+
+    @abstractmethod
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link in the last step, with forces; near bodies are left out."""
 

@@ -421,6 +421,11 @@ class PhysicsWorld:
             if touch.other in self._names_by_body_id
         ]
 
+    def touched(self, body: SimulatedBody) -> set[str]:
+        """Returns the names of the other models that any link of a model pressed on in the last step."""
+        ids = {other for part in body.parts for other in self.engine.touched(part.number)}
+        return {self._names_by_body_id[each] for each in ids if each in self._names_by_body_id} - {body.name}
+
     def contact_points(self, model: str, link: str) -> list[ContactPoint]:
         """Returns the contact points of a link in the last physics step.
 

@@ -481,6 +481,11 @@ class PyBulletEngine(PhysicsEngine):
         touches = [Touch(self._store.number(point[2]), point[9], point[8]) for point in self._contacts(number, index)]
         return [touch for touch in touches if touch.other != number]
 
+    def touched(self, number: int) -> set[int]:
+        """Returns the bodies that a body presses on."""
+        points = self.api.getContactPoints(bodyA=number, physicsClientId=self.client)
+        return {point[2] for point in points if point[9] > 0.0 and point[2] != number}
+
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link, with forces."""
         records = [record for record in self._contacts(number, index) if record[9] > 0.0 or record[8] <= 0.0]
