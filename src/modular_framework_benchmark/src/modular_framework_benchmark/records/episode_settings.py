@@ -6,11 +6,12 @@ The names of the fields are the keys of experiment files, databases and records.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_args, get_type_hints
 
 
 class SettingsError(ValueError):
@@ -115,6 +116,27 @@ class EpisodeSettings:
         return frozenset()
 
 
+class Tagged:
+    """Base of dataclasses that can stand in the same field; JSON values name the class: `{"upright": {...}}`."""
+
+    __slots__ = ()
+    kinds: ClassVar[dict[str, type[Tagged]]] = {}
+    """All classes, keyed by their name with underscores."""
+
+    def __init_subclass__(cls) -> None:
+        """Registers the class."""
+        Tagged.kinds[_underscored(cls.__name__)] = cls
+
+    @property
+    def kind(self) -> str:
+        """Returns the name of the class with underscores."""
+        return _underscored(type(self).__name__)
+
+
+def _underscored(name: str) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
 SettingsT = TypeVar("SettingsT", bound=EpisodeSettings)
 _T = TypeVar("_T")
 
@@ -123,7 +145,8 @@ def as_json(value: Any) -> Any:
     """Returns a value as JSON values; a dataclass becomes a mapping of its fields that are not None."""
     if is_dataclass(value):
         content = {item.name: getattr(value, item.name) for item in fields(value)}
-        return {name: as_json(part) for name, part in content.items() if part is not None}
+        mapping = {name: as_json(part) for name, part in content.items() if part is not None}
+        return {value.kind: mapping} if isinstance(value, Tagged) else mapping
     return [as_json(part) for part in value] if isinstance(value, tuple) else value
 
 
@@ -147,5 +170,9 @@ _hints = lru_cache(get_type_hints)
 def _decoded(hint: Any, value: Any) -> Any:
     if isinstance(value, list):
         return tuple(_decoded(get_args(hint)[0], part) for part in value)
-    kind = next((one for one in (hint, *get_args(hint)) if is_dataclass(one)), None)
-    return from_json(kind, value) if isinstance(value, Mapping) and isinstance(kind, type) else value
+    hints = [one for one in (hint, *get_args(hint)) if isinstance(one, type)]
+    if isinstance(value, Mapping) and any(issubclass(one, Tagged) for one in hints):
+        ((name, content),) = value.items()
+        return from_json(Tagged.kinds[name], content)
+    kind = next((one for one in hints if is_dataclass(one)), None)
+    return from_json(kind, value) if isinstance(value, Mapping) and kind is not None else value

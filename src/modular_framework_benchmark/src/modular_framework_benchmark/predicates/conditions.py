@@ -1,0 +1,513 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Conditions on the objects of an episode.
+
+Frames are those of the simulation: the world frame has z up; the frame of a model is that of its SDF file. The box of
+an object is the bounding box of its collision shapes in the model frame. "At the start" is the start of the task.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from modular_framework_benchmark.predicates.predicate import Condition
+from modular_framework_benchmark.predicates.predicate_keys import KeyKind, name, number, vector
+from modular_framework_benchmark.predicates.world_track import ROBOT, WORLD, BodyTrack, Flags, Floats, WorldTrack
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Region:
+    """A box in the world frame.
+
+    Attributes:
+        name: Name of the region.
+        x: Smallest and largest x [m].
+        y: Smallest and largest y [m].
+        z: Smallest and largest z [m]; None for any height.
+    """
+
+    name: str
+    x: Span
+    y: Span
+    z: Span | None = None
+
+    def contains(self, points: Floats) -> Flags:
+        """Returns whether points are in the region, shape (n,).
+
+        Args:
+            points: Points in the world frame, shape (n, 3) [m].
+        """
+        inside = [(points[:, axis] >= low) & (points[:, axis] <= high) for axis, (low, high) in self._spans]
+        return np.logical_and.reduce(inside)
+
+    def is_apart_from(self, other: Region) -> bool:
+        """Returns whether the region has no point in common with another region."""
+        spans = dict(other._spans)
+        return any(
+            axis in spans and (high < spans[axis][0] or spans[axis][1] < low) for axis, (low, high) in self._spans
+        )
+
+    @property
+    def _spans(self) -> list[tuple[int, Span]]:
+        return [(axis, span) for axis, span in enumerate((self.x, self.y, self.z)) if span is not None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectCondition(Condition):
+    """A condition on one object.
+
+    Attributes:
+        object: Name of the object.
+    """
+
+    object: str = name(KeyKind.OBJECT)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the name of the object."""
+        return (self.object,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lifted(ObjectCondition):
+    """The frame of the object is higher in the world frame than at the start of the task.
+
+    Attributes:
+        height: Height above the start that must be exceeded [m].
+    """
+
+    height: float = number(0.1, high=10.0)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is more than {self.height:g} m higher than at the start"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the object is higher than wanted, shape (n,)."""
+        return self._heights(world) > self.height
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the height above the start."""
+        return f"'{self.object}' is {self._heights(world)[-1]:.3f} m higher (wanted: more than {self.height:g} m)"
+
+    def _heights(self, world: WorldTrack) -> Floats:
+        heights = world.bodies[self.object].positions[:, 2]
+        return np.asarray(heights - heights[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldFor(ObjectCondition):
+    """A gripper holds the object: the object touches two fingers, with interruptions of less than 0.3 s."""
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is in the gripper"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether a gripper holds the object, shape (n,)."""
+        return world.holds(self.object)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns whether a gripper holds the object."""
+        return f"'{self.object}' is {'' if world.holds(self.object)[-1] else 'not '}in the gripper"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InRegion(ObjectCondition):
+    """The centre of the object's box is in a region of the world frame.
+
+    Attributes:
+        region: The region.
+    """
+
+    region: Region = name(KeyKind.REGION)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is in the region '{self.region.name}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the centre is in the region, shape (n,)."""
+        return self.region.contains(world.bodies[self.object].centres)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the position of the centre."""
+        x, y, z = world.bodies[self.object].centres[-1]
+        return f"'{self.object}' is at ({x:.3f}, {y:.3f}, {z:.3f}) m (wanted: in the region '{self.region.name}')"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class On(ObjectCondition):
+    """The object lies on a support.
+
+    The object touches the support, the lowest point of the object's box is at the height of the highest point of the
+    support's box, and the centre of the object's box is above the support's box.
+
+    Attributes:
+        support: Name of the model below the object.
+        tolerance: Largest difference between the two heights [m].
+    """
+
+    support: str = name(KeyKind.MODEL)
+    tolerance: float = number(0.01, high=1.0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the object and of the support."""
+        return (self.object, self.support)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' lies on '{self.support}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the object lies on the support, shape (n,)."""
+        touching, level = world.touches(self.object, self.support), np.abs(self._gaps(world)) <= self.tolerance
+        return touching & level & _is_above(world.bodies[self.object].centres, world.bodies[self.support])
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the contact and the gap between object and support."""
+        touch = "touches" if world.touches(self.object, self.support)[-1] else "does not touch"
+        gap = f"its bottom is {self._gaps(world)[-1]:.3f} m above the top of '{self.support}'"
+        return f"'{self.object}' {touch} '{self.support}', and {gap} (wanted: on '{self.support}')"
+
+    def _gaps(self, world: WorldTrack) -> Floats:
+        bottom = world.bodies[self.object].corners[:, :, 2].min(axis=1)
+        return np.asarray(bottom - world.bodies[self.support].corners[:, :, 2].max(axis=1))
+
+
+def _is_above(points: Floats, body: BodyTrack) -> Flags:
+    """Returns whether points are above or below the box of a body, shape (n,).
+
+    The projection of the box on the ground is a polygon with the projected edges of the box as sides. A point is inside
+    if it is within the polygon's width along the normal of each side.
+
+    Args:
+        points: Points in the world frame, shape (n, 3) [m].
+        body: States of the body.
+    """
+    edges = body.rotations.as_matrix()[:, :2, :] * (body.box[1] - body.box[0]) / 2.0
+    offsets = (points - body.centres)[:, :2]
+    inside = np.ones(len(points), dtype=bool)
+    for axis in range(3):
+        normals = np.column_stack([-edges[:, 1, axis], edges[:, 0, axis]])
+        widths = np.abs(np.einsum("ni,nij->nj", normals, edges)).sum(axis=1)
+        inside &= np.abs(np.einsum("ni,ni->n", normals, offsets)) <= widths
+    return inside
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inside(ObjectCondition):
+    """All corners of the object's box are inside the box of a container, in the frame of the container.
+
+    Attributes:
+        container: Name of the model around the object.
+        tolerance: Distance by which corners may leave the container's box [m].
+    """
+
+    container: str = name(KeyKind.MODEL)
+    tolerance: float = number(0.005, high=1.0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the object and of the container."""
+        return (self.object, self.container)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is inside '{self.container}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether all corners are inside, shape (n,)."""
+        return self._excess(world) <= self.tolerance
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the distance by which corners leave the container's box."""
+        excess = f"leaves the box of '{self.container}' by {max(self._excess(world)[-1], 0.0):.3f} m"
+        return f"'{self.object}' {excess} (wanted: at most {self.tolerance:g} m)"
+
+    def _excess(self, world: WorldTrack) -> Floats:
+        container = world.bodies[self.container]
+        points, (low, high) = container.points_in_frame(world.bodies[self.object].corners), container.box
+        return np.asarray(np.maximum(low - points, points - high).max(axis=(1, 2)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Upright(ObjectCondition):
+    """The z axis of the object points up in the world frame.
+
+    Attributes:
+        angle: Largest angle between the axis and the vertical [rad].
+    """
+
+    angle: float = number(0.1, high=3.1416)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' stands upright"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the axis points up, shape (n,)."""
+        return self._angles(world) <= self.angle
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the angle to the vertical."""
+        return f"'{self.object}' is tilted by {self._angles(world)[-1]:.3f} rad (wanted: at most {self.angle:g} rad)"
+
+    def _angles(self, world: WorldTrack) -> Floats:
+        body = world.bodies[self.object]
+        cosines = np.where(np.isnan(body.positions[:, 0]), np.nan, body.rotations.as_matrix()[:, 2, 2])
+        return np.arccos(np.clip(cosines, -1.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aligned(ObjectCondition):
+    """The frame of the object is at a pose in the world frame or in the frame of another model.
+
+    Attributes:
+        relative_to: Name of the model in whose frame the pose is given, or `world`.
+        position: Wanted position of the object [m].
+        rpy: Wanted roll, pitch and yaw of the object [rad].
+        distance: Largest distance from the position [m].
+        angle: Largest rotation angle from the orientation [rad]; pi allows every orientation.
+    """
+
+    relative_to: str = name(KeyKind.MODEL, WORLD, default=WORLD)
+    position: tuple[float, float, float] = vector(low=-100.0, high=100.0)
+    rpy: tuple[float, float, float] = vector(low=-6.2832, high=6.2832)
+    distance: float = number(0.01, high=10.0)
+    angle: float = number(0.1, high=3.1416)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the object and of the model with the frame."""
+        return (self.object,) if self.relative_to == WORLD else (self.object, self.relative_to)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is at {self.position} m, {self.rpy} rad of '{self.relative_to}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the pose is within both tolerances, shape (n,)."""
+        distances, angles = self._errors(world)
+        return (distances <= self.distance) & (angles <= self.angle)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the distance and the angle from the wanted pose."""
+        distances, angles = self._errors(world)
+        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
+        return f"'{self.object}' is {distances[-1]:.3f} m and {angles[-1]:.3f} rad from its pose ({wanted})"
+
+    def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
+        body, positions, rotations = world.bodies[self.object], np.array(self.position), _rotation(self.rpy)
+        if self.relative_to != WORLD:
+            frame = world.bodies[self.relative_to]
+            positions = frame.positions + frame.rotations.apply(positions)
+            rotations = frame.rotations * rotations
+        distances = np.linalg.norm(body.positions - positions, axis=1)
+        return distances, (rotations.inv() * body.rotations).magnitude()
+
+
+def _rotation(rpy: tuple[float, float, float]) -> Rotation:
+    return Rotation.from_euler("xyz", rpy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointAtLeast(Condition):
+    """A joint of an articulated model, such as a drawer, is at a position or beyond.
+
+    Attributes:
+        model: Name of the model.
+        joint: Name of the joint.
+        position: Smallest position [rad or m].
+    """
+
+    model: str = name(KeyKind.MODEL)
+    joint: str = name(KeyKind.NAME)
+    position: float = number(None, low=-1000.0, required=True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the name of the model."""
+        return (self.model,)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the joint is at the position or beyond, shape (n,); never for an unknown joint."""
+        positions = world.bodies[self.model].joints.get(self.joint)
+        return np.zeros(len(world.times_s), dtype=bool) if positions is None else positions >= self.position
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the position of the joint, or the joints of the model."""
+        joints = world.bodies[self.model].joints
+        if self.joint not in joints:
+            return f"'{self.model}' has no joint '{self.joint}'; its joints: {', '.join(joints) or 'none'}"
+        found = f"joint '{self.joint}' of '{self.model}' is at {joints[self.joint][-1]:.3f}"
+        return f"{found} (wanted: at least {self.position:g})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cleared(Condition):
+    """The centres of the boxes of all objects are outside a region of the world frame.
+
+    Attributes:
+        region: The region.
+        objects: Names of the objects.
+    """
+
+    region: Region = name(KeyKind.REGION)
+    objects: tuple[str, ...] = name(KeyKind.OBJECTS)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the objects."""
+        return self.objects
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"none of {', '.join(self.objects)} is in the region '{self.region.name}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether all objects are outside, shape (n,)."""
+        return ~np.logical_or.reduce([self.region.contains(world.bodies[each].centres) for each in self.objects])
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the objects in the region."""
+        left = [each for each in self.objects if self.region.contains(world.bodies[each].centres)[-1]]
+        return f"{', '.join(left) or 'nothing'} is in the region '{self.region.name}' (wanted: nothing)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotMoved(ObjectCondition):
+    """The frame of the object is at its pose at the start of the task.
+
+    Attributes:
+        distance: Largest distance from the start [m].
+        angle: Largest rotation angle from the start [rad].
+    """
+
+    distance: float = number(0.01, high=10.0)
+    angle: float = number(0.1, high=3.1416)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' is where it was at the start"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the object is within both tolerances of its start, shape (n,)."""
+        distances, angles = self._errors(world)
+        return (distances <= self.distance) & (angles <= self.angle)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the distance and the angle from the start."""
+        distances, angles = self._errors(world)
+        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
+        return f"'{self.object}' has moved by {distances[-1]:.3f} m and {angles[-1]:.3f} rad ({wanted})"
+
+    def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
+        body = world.bodies[self.object]
+        distances = np.linalg.norm(body.positions - body.positions[0], axis=1)
+        return distances, (body.rotations[0].inv() * body.rotations).magnitude()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoContact(ObjectCondition):
+    """The object does not press on another model.
+
+    Attributes:
+        other: Name of the other model, or `robot` for any robot.
+    """
+
+    other: str = name(KeyKind.MODEL, ROBOT, default=ROBOT)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of both models."""
+        return (self.object,) if self.other == ROBOT else (self.object, self.other)
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"'{self.object}' does not touch '{self.other}'"
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the models do not touch, shape (n,)."""
+        exists = ~np.isnan(world.bodies[self.object].positions[:, 0])
+        return exists & ~world.touches(self.object, self.other)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns whether the models touch."""
+        touch = "touches" if world.touches(self.object, self.other)[-1] else "does not touch"
+        return f"'{self.object}' {touch} '{self.other}' (wanted: no contact)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stacked(Condition):
+    """Each object lies on the one before, as in `On`.
+
+    Attributes:
+        objects: Names of at least two objects, the lowest first.
+        tolerance: Largest difference between the heights of two touching faces [m].
+    """
+
+    objects: tuple[str, ...] = name(KeyKind.OBJECTS)
+    tolerance: float = number(0.01, high=1.0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the objects."""
+        return self.objects
+
+    @property
+    def statement(self) -> str:
+        """Returns the condition in words."""
+        return f"{', '.join(self.objects)} are stacked, the lowest first"
+
+    @property
+    def pairs(self) -> tuple[On, ...]:
+        """Returns the conditions on neighbouring objects, from the bottom."""
+        neighbours = zip(self.objects, self.objects[1:], strict=False)
+        return tuple(On(object=upper, support=lower, tolerance=self.tolerance) for lower, upper in neighbours)
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether all pairs lie on each other, shape (n,)."""
+        return np.logical_and.reduce([pair.within(world) for pair in self.pairs])
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the lowest pair that does not lie on each other."""
+        wrong = [pair for pair in self.pairs if not pair.within(world)[-1]]
+        return wrong[0].measured(world) if wrong else self.statement
+
+
+CONDITIONS: dict[str, type[Condition]] = {
+    "lifted": Lifted,
+    "held_for": HeldFor,
+    "in_region": InRegion,
+    "on": On,
+    "inside": Inside,
+    "upright": Upright,
+    "aligned": Aligned,
+    "joint_at_least": JointAtLeast,
+    "cleared": Cleared,
+    "not_moved": NotMoved,
+    "no_contact": NoContact,
+    "stacked": Stacked,
+}
+"""All conditions, keyed by their name in experiment files."""

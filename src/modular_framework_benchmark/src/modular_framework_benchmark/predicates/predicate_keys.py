@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keys of predicates in experiment files: kinds of values and their limits."""
+
+from __future__ import annotations
+
+from dataclasses import Field, dataclass, field, fields
+from enum import Enum
+from typing import Any
+
+_KEY = "predicate_key"
+
+
+class KeyKind(Enum):
+    """Kind of a value."""
+
+    OBJECT = "object"  # name of a model; by default the first object of the experiment
+    OBJECTS = "objects"  # list of names of models; by default all objects of the experiment
+    MODEL = "model"  # name of a model
+    REGION = "region"  # name of a region
+    NUMBER = "number"
+    VECTOR = "vector"  # three numbers
+    NAME = "name"  # a text that is checked in the episode, such as the name of a joint
+
+
+@dataclass(frozen=True, slots=True)
+class PredicateKey:
+    """Value that a key of a predicate takes.
+
+    Attributes:
+        kind: Kind of the value.
+        low: Smallest number.
+        high: Largest number.
+        extra: Allowed names besides those of models.
+    """
+
+    kind: KeyKind
+    low: float = 0.0
+    high: float = 1000.0
+    extra: tuple[str, ...] = ()
+
+
+def number(default: float | None, *, low: float = 0.0, high: float = 1000.0, required: bool = False) -> Any:
+    """Declares a number.
+
+    Args:
+        default: Value of an absent key.
+        low: Smallest number.
+        high: Largest number.
+        required: Whether the key must be present; the default is then ignored.
+    """
+    key = {_KEY: PredicateKey(KeyKind.NUMBER, low, high)}
+    return field(metadata=key) if required else field(default=default, metadata=key)
+
+
+def vector(*, low: float, high: float) -> Any:
+    """Declares three numbers, zeros by default."""
+    return field(default=(0.0, 0.0, 0.0), metadata={_KEY: PredicateKey(KeyKind.VECTOR, low, high)})
+
+
+def name(kind: KeyKind, *extra: str, default: str = "") -> Any:
+    """Declares a name or names.
+
+    Args:
+        kind: Kind of the name.
+        *extra: Allowed names besides those of models.
+        default: Name of an absent key; "" if the key must be present or has the default of its kind.
+    """
+    metadata = {_KEY: PredicateKey(kind, extra=extra)}
+    return field(default=default, metadata=metadata) if default else field(metadata=metadata)
+
+
+def keys_of(kind: type[Any]) -> dict[str, tuple[PredicateKey, Field[Any]]]:
+    """Returns the keys of a class of conditions with their fields, keyed by name."""
+    return {item.name: (item.metadata[_KEY], item) for item in fields(kind) if _KEY in item.metadata}

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Predicates hold where the world says so, for as long as they are asked for, and say what was found otherwise."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from predicate_worlds import STANDING_M, sample, stage_of, state
+
+from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
+from modular_framework_benchmark.predicates.conditions import (
+    Aligned,
+    Cleared,
+    HeldFor,
+    InRegion,
+    Inside,
+    JointAtLeast,
+    Lifted,
+    NoContact,
+    NotMoved,
+    On,
+    Region,
+    Stacked,
+    Upright,
+)
+from modular_framework_benchmark.predicates.predicate import All, Condition, InOrder, Not, Predicate
+from modular_framework_benchmark.predicates.predicate import Any as AnyOf
+from modular_framework_benchmark.predicates.progress import Milestone, progress_of
+from modular_framework_benchmark.predicates.stages import OperatorStage, SimulatedStage
+
+GOAL = Region(name="goal", x=(0.1, 0.3), y=(-0.1, 0.1))
+START = {"table": state((0, 0, 0)), "cube": state((0, 0, STANDING_M)), "lid": state((0.3, 0.2, STANDING_M))}
+
+
+def last(predicate: Predicate, states: dict[str, Any], *, contacts: Any = (), held: Any = ()) -> bool:
+    """Whether a predicate holds in a world that was at START before."""
+    stage = stage_of(sample(0.0, START, [], []), sample(1.0, states, [list(pair) for pair in contacts], list(held)))
+    holds = bool(predicate.over(stage)[-1])
+    assert bool(predicate.unmet(stage)) is not holds
+    return holds
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds", "fails"),
+    [
+        (Lifted(object="cube", height=0.1), {"cube": state((0, 0, 0.9301))}, {"cube": state((0, 0, 0.9299))}),
+        (InRegion(object="cube", region=GOAL), {"cube": state((0.3, 0.1, 5))}, {"cube": state((0.301, 0.1, 5))}),
+        (
+            Upright(object="cube", angle=0.2),
+            {"cube": state((0, 0, 1), (0.19, 0, 3))},
+            {"cube": state((0, 0, 1), (0.15, 0.15, 0))},
+        ),
+        (
+            NotMoved(object="cube", distance=0.01),
+            {"cube": state((0.01, 0, STANDING_M))},
+            {"cube": state((0.0101, 0, STANDING_M))},
+        ),
+        (
+            NotMoved(object="cube", angle=0.1),
+            {"cube": state((0, 0, STANDING_M), (0, 0, 0.09))},
+            {"cube": state((0, 0, STANDING_M), (0, 0, 0.11))},
+        ),
+        (Cleared(region=GOAL, objects=("cube", "lid")), {"lid": state((0.3, 0.2, 0))}, {"lid": state((0.2, 0, 0))}),
+        (
+            Inside(object="cube", container="bin", tolerance=0.0),
+            {"bin": state((1, 1, 0), (0, 0, 0.7)), "cube": state((1, 1, 0.031))},
+            {"bin": state((1, 1, 0)), "cube": state((1.081, 1, 0.031))},
+        ),
+        (
+            JointAtLeast(model="bin", joint="lid", position=0.3),
+            {"bin": state((0, 0, 0), joints={"lid": 0.3})},
+            {"bin": state((0, 0, 0), joints={"lid": 0.29})},
+        ),
+        (
+            Aligned(object="cube", relative_to="lid", position=(0, 0, 0.06)),
+            {"cube": state((0.3, 0.2, STANDING_M + 0.065))},
+            {"cube": state((0.3, 0.2, STANDING_M))},
+        ),
+        (
+            Aligned(object="cube", position=(0, 0, STANDING_M), rpy=(0, 0, 0.5)),
+            {"cube": state((0, 0, STANDING_M), (0, 0, 0.45))},
+            {},
+        ),
+        (
+            Aligned(object="cube", position=(0, 0, STANDING_M), rpy=(0, 0, 0.5), angle=math.pi),
+            {},
+            {"cube": state((0, 0, 1))},
+        ),
+    ],
+)
+def test_a_condition_on_poses_holds_within_its_tolerance(
+    condition: Condition, holds: dict[str, Any], fails: dict[str, Any]
+) -> None:
+    assert last(condition, holds)
+    assert not last(condition, fails)
+
+
+def test_an_object_lies_on_what_it_touches_below_its_centre() -> None:
+    on, touch = On(object="cube", support="table"), [("cube", "table")]
+    assert last(on, {}, contacts=touch)
+    assert not last(on, {})  # no contact
+    assert not last(on, {"cube": state((0, 0, STANDING_M + 0.02))}, contacts=touch)  # above it
+    assert last(on, {"cube": state((0.499, 0, STANDING_M))}, contacts=touch)
+    assert not last(on, {"cube": state((0.501, 0, STANDING_M))}, contacts=touch)  # beside its edge
+    turned = {"table": state((0, 0, 0), (0, 0, math.pi / 2)), "cube": state((0.29, 0.49, STANDING_M))}
+    assert last(on, turned, contacts=touch)
+    assert not last(on, turned | {"cube": state((0.49, 0.29, STANDING_M))}, contacts=touch)
+
+
+def test_a_stack_needs_every_pair() -> None:
+    stack = Stacked(objects=("table", "cube", "lid"))
+    states = {"lid": state((0, 0, STANDING_M + 0.06))}
+    assert last(stack, states, contacts=[("cube", "table"), ("cube", "lid")])
+    assert not last(stack, states, contacts=[("cube", "table")])
+
+
+def test_contact_and_grasp_come_from_the_simulation() -> None:
+    assert last(HeldFor(object="cube"), {}, held=["cube"]) and not last(HeldFor(object="cube"), {}, held=["lid"])
+    assert last(NoContact(object="cube"), {}, contacts=[("arm", "lid"), ("cube", "table")])
+    assert not last(NoContact(object="cube"), {}, contacts=[("arm", "cube")])
+    assert not last(NoContact(object="cube", other="table"), {}, contacts=[("cube", "table")])
+
+
+def test_a_condition_must_hold_for_its_duration_without_interruption() -> None:
+    times_s = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
+    held = [["cube"], ["cube"], [], ["cube"], ["cube"], ["cube"]]
+    samples = [
+        sample(time_s, START if not time_s else {}, [], each) for time_s, each in zip(times_s, held, strict=True)
+    ]
+    stage = stage_of(*samples)
+    assert HeldFor(object="cube").over(stage).tolist() == [True, True, False, True, True, True]
+    assert HeldFor(object="cube", duration=1.0).over(stage).tolist() == [False] * 5 + [True]
+    assert HeldFor(object="cube", duration=2.0).unmet(stage) == ("'cube' is in the gripper for less than 2 s",)
+
+
+def test_combinations_hold_as_their_names_say() -> None:
+    times = [(0.0, [], START), (1.0, ["cube"], {}), (2.0, ["cube"], {"cube": state((0, 0, 1))}), (3.0, [], {})]
+    stage = stage_of(*(sample(time_s, states, [], held) for time_s, held, states in times))
+    held, lifted = HeldFor(object="cube"), Lifted(object="cube", height=0.1)
+    assert All((held, lifted)).over(stage).tolist() == [False, False, True, False]
+    assert AnyOf((held, lifted)).over(stage).tolist() == [False, True, True, True]
+    assert Not(held).over(stage).tolist() == [True, False, False, True]
+    assert InOrder((held, lifted, Not(held))).over(stage).tolist() == [False, False, False, True]
+    assert not InOrder((lifted, Not(lifted))).over(stage).any()
+    assert InOrder((Not(held), lifted, held)).over(stage).tolist() == [False, False, True, True]
+    assert All((held, lifted)).unmet(stage) == ("'cube' is not in the gripper",)
+    assert Not(lifted).unmet(stage) == ("'cube' is more than 0.1 m higher than at the start, which must not hold",)
+
+
+def test_a_model_that_is_not_in_the_world_satisfies_nothing() -> None:
+    stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": None}))
+    assert not NotMoved(object="cube").over(stage)[-1] and not NoContact(object="cube").over(stage)[-1]
+    assert Upright(object="cup").unmet(stage) == ("there is no 'cup' in the world",)
+
+
+def test_the_task_begins_at_its_last_sample_and_what_was_before_does_not_count() -> None:
+    stage = stage_of(
+        sample(0.0, START | {"cube": state((0, 0, 1.5))}, [], ["cube"]),
+        sample(1.0, {"cube": state((0, 0, STANDING_M))}, None, []),
+        sample(2.0, {"cube": state((0, 0, STANDING_M + 0.2))}),
+        started_s=1.01,
+    )
+    assert stage.times_s.tolist() == [1.0, 2.0]
+    assert Lifted(object="cube").over(stage).tolist() == [False, True]
+    assert not HeldFor(object="cube").over(stage).any()
+
+
+STEPS = (
+    Milestone(name="grasped", predicate=HeldFor(object="cube")),
+    Milestone(name="lifted", predicate=Lifted(object="cube", height=0.1), weight=2.0),
+    Milestone(name="placed", predicate=InRegion(object="cube", region=GOAL)),
+)
+
+
+def test_progress_counts_milestones_in_their_order_and_keeps_what_was_reached() -> None:
+    times = [(0.0, [], START), (1.0, ["cube"], {}), (2.0, ["cube"], {"cube": state((0, 0, 1))}), (3.0, [], START)]
+    stage = stage_of(*(sample(time_s, states, [], held) for time_s, held, states in times))
+    progress = progress_of(STEPS, stage)
+    assert progress.times_s == (1.0, 2.0) and progress.missed == "placed"
+    assert progress.fraction == pytest.approx(3 / 4)
+    backwards = progress_of(STEPS[::-1], stage)
+    assert backwards.times_s == () and (backwards.fraction, backwards.missed) == (0.0, "placed")
+
+
+def test_milestones_that_are_reached_at_the_same_moment_both_count() -> None:
+    stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": state((0.2, 0, 1))}, None, ["cube"]))
+    progress = progress_of(STEPS, stage)
+    assert progress.times_s == (1.0, 1.0, 1.0) and (progress.fraction, progress.missed) == (1.0, "")
+
+
+def test_an_operator_answers_the_same_predicates() -> None:
+    answers = {
+        0.0: {"'cube' is in the gripper": False},
+        1.0: {"'cube' is in the gripper": True},
+        2.0: {"'cube' is in the gripper": True, "'cube' is more than 0.1 m higher than at the start": True},
+    }
+    asked: list[str] = []
+    now_s = 0.0
+
+    def ask(statement: str) -> bool:
+        asked.append(statement)
+        return answers[now_s].get(statement, False)
+
+    stage = OperatorStage(ask)
+    for now_s in answers:
+        stage.look(now_s, [step.predicate for step in STEPS])
+    assert len(asked) == 9
+    progress = progress_of(STEPS, stage)
+    assert progress.times_s == (1.0, 2.0) and progress.missed == "placed"
+    assert HeldFor(object="cube", duration=1.0).over(stage).tolist() == [False, False, False]  # was not asked
+    unmet = InRegion(object="cube", region=GOAL).unmet(stage)
+    assert unmet == ("the operator denies that 'cube' is in the region 'goal'",)
+
+
+def test_the_short_form_of_a_pick_is_made_of_the_same_predicates() -> None:
+    pick = SuccessCriteria(lifted=0.2).predicate("cube")
+    assert pick == All((Lifted(object="cube", height=0.2), HeldFor(object="cube")))
+    stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": state((0, 0, STANDING_M + 0.1))}))
+    assert pick.unmet(stage) == (
+        "'cube' is 0.100 m higher (wanted: more than 0.2 m)",
+        "'cube' is not in the gripper",
+    )
+    own = SuccessCriteria(required=Upright(object="cube"))
+    assert own.predicate("cube") == All((Upright(object="cube"),)) and not own.is_pick
+
+
+def test_a_stage_without_moments_has_reached_nothing() -> None:
+    empty = OperatorStage(lambda _: True)
+    assert Upright(object="cube").unmet(empty) and isinstance(stage_of(sample(0.0, START)), SimulatedStage)
