@@ -85,6 +85,9 @@ class FakeResources:
             raise UnresolvedReference(f"there is no model '{name}'; allowed: {', '.join(SHAPES)}")
         return self._folder / name / "model.sdf"
 
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
+        return ("ground_plane", "table")
+
     def package(self, name: str) -> Path:
         if name != "some_moveit_config":
             raise UnresolvedReference(f"there is no package '{name}'")

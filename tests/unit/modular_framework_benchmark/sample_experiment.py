@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import itertools
 
-from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
+from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.episode_settings import OwnMetric, PlacedObject
 from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind

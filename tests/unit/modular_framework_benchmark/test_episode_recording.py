@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState
-from gazebo_msgs.msg import ModelStates
-from geometry_msgs.msg import Point, Pose
+from predicate_worlds import sample, state
 from sensor_msgs.msg import JointState
 
 from modular_framework_benchmark.episodes.ros_recording import (
@@ -22,6 +22,7 @@ from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.results.lerobot_frames import ACTION, read_frames
 
 RATE = 50.0
+NO_RECORD = {"samples": [], "boxes": {}, "robots": []}
 STEP_S = 1.0 / 240.0
 
 
@@ -59,21 +60,19 @@ def test_lost_states_are_counted() -> None:
     assert count_missing_samples(times_s[:0], RATE) == 0
 
 
-@pytest.mark.parametrize(
-    ("lost", "fault"),
-    [(0, ""), (3, "17 messages of the models arrived instead of 20: their poses have times of arrival")],
-)
-def test_lost_messages_of_the_models_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: int, fault: str
-) -> None:
-    monkeypatch.setattr(rospy, "get_time", lambda: 0.0)
+def test_poses_are_those_of_the_simulation_and_a_model_at_rest_has_one_row(tmp_path: Path) -> None:
     samples = Samples()
     samples.joints = states(published(0.4))
-    models = [ModelStates(name=["cube"], pose=[Pose(position=Point(z=0.1 * number))]) for number in range(20)]
-    early = (0.0, ModelStates(name=["table"], pose=[Pose()]))  # from before the cube was put into the world
-    samples.models = [early, *((0.02 * number, message) for number, message in enumerate(models[lost:]))]
-    written = write_recording(tmp_path, samples, {"cube": "cube"}, {"zero": 0.0, "simulated_s": 0.4}, RATE)
-    assert written["recording_fault"] == fault
+    moving = [sample(0.02 * number, {"cube": state((0, 0, 0.1 * number))}, None, None) for number in range(20)]
+    moving[0] = sample(0.0, {"cube": state((0, 0, 0)), "table": state((1, 0, 0))}, [], [])
+    world = {"samples": moving, "boxes": {}, "robots": []}
+    answer = {"zero": 0.0, "simulated_s": 0.4, "checked_s": 0.3}
+    written = write_recording(tmp_path, samples, world, spawned={"cube": "cube"}, answer=answer, rate_hz=RATE)
+    assert written["recording_fault"] == "" and written["final"]["cube"][2] == pytest.approx(1.5)
+    objects = json.loads((tmp_path / "recording.json").read_text())["objects"]
+    assert objects["cube"]["time_s"] == pytest.approx([0.02 * number for number in range(20)])
+    assert objects["cube"]["z"] == pytest.approx([0.1 * number for number in range(20)])
+    assert objects["table"]["x"] == [1.0]
 
 
 def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,7 +85,8 @@ def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: py
     close = JointControllerState(set_point=1.2)
     close.header.stamp = rospy.Time.from_sec(0.25)
     samples.set_points = [("knuckle", close)]
-    write_recording(tmp_path, samples, {}, {"zero": 0.0, "simulated_s": 0.4}, None)
+    answer = {"zero": 0.0, "simulated_s": 0.4}
+    write_recording(tmp_path, samples, NO_RECORD, spawned={}, answer=answer, rate_hz=None)
     frames = read_frames(tmp_path / "trajectory.parquet", 10)
     gripper = frames.values[ACTION][:, frames.names[ACTION].index("knuckle")]
     assert gripper == pytest.approx([0.1, 0.2, 1.2, 1.2]), "the measured position before the first command"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,14 @@ from modular_framework_benchmark.episodes.errors import VideoError
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.shake_motion import shake_motion
 from modular_framework_benchmark.episodes.stack import write_parameters
-from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
-from modular_framework_benchmark.records.episode_settings import PlacedObject, SettingsError
+from modular_framework_benchmark.experiments.modes import stored_settings
+from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.predicates.conditions import CONDITIONS, Region
+from modular_framework_benchmark.predicates.predicate import All, InOrder, Not
+from modular_framework_benchmark.predicates.predicate import Any as AnyOf
+from modular_framework_benchmark.predicates.progress import Milestone
+from modular_framework_benchmark.records.episode_settings import PlacedObject, SettingsError, as_json, from_json
 
 CAN = PlacedObject("can_1", "can", 1.0, 2.0, 3.0)
 
@@ -24,11 +31,35 @@ CAN = PlacedObject("can_1", "can", 1.0, 2.0, 3.0)
 def test_success_is_about_the_first_object_and_without_criteria_about_the_task_alone() -> None:
     settings = TaskSettings(objects=(CAN,), success=SuccessCriteria(lifted=0.2))
     assert settings.judged_object == "can_1"
-    assert (settings.success.lifted_m, settings.success.hold_s) == (0.2, 2.0)
+    assert settings.success.hold_s == 2.0 and TaskSettings().success.hold_s == 0.0
     assert replace(settings, success=SuccessCriteria(object="cup")).judged_object == "cup"
     assert TaskSettings(objects=(CAN,)).judged_object == ""
     with pytest.raises(SettingsError, match="names no object"):
         _ = replace(settings, objects=()).judged_object
+
+
+def test_every_condition_is_stored_and_read_again_and_its_parts_are_documented() -> None:
+    region = Region(name="goal", x=(0.0, 1.0), y=(0.0, 1.0), z=(0.5, 1.0))
+    given: dict[str, dict[str, Any]] = {
+        "in_region": {"region": region},
+        "cleared": {"region": region, "objects": ("a", "b")},
+        "stacked": {"objects": ("a", "b")},
+        "on": {"support": "a"},
+        "inside": {"container": "a"},
+        "joint_at_least": {"model": "a", "joint": "b", "position": 1.0},
+    }
+    parts = []
+    for name, kind in CONDITIONS.items():
+        own = {} if name in ("cleared", "stacked", "joint_at_least") else {"object": "cube"}
+        parts.append(kind(**(own | given.get(name, {})), duration=1.5))  # type: ignore[arg-type]
+        assert parts[-1].kind == name and kind.__doc__
+    whole = Not(InOrder((All(tuple(parts)), AnyOf((parts[0],)))))
+    settings = TaskSettings(
+        success=SuccessCriteria(required=whole), progress=(Milestone(name="m", predicate=parts[0]),), regions=(region,)
+    )
+    assert stored_settings("task", as_json(settings)) == settings
+    assert as_json(parts[0]) == {"lifted": {"duration": 1.5, "object": "cube", "height": 0.1}}
+    assert from_json(Milestone, as_json(settings.progress[0])) == settings.progress[0]
 
 
 def test_a_launch_file_has_a_package_or_is_a_path_and_the_task_is_an_argument(tmp_path: Path) -> None:

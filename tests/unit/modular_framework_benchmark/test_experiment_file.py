@@ -15,6 +15,9 @@ from modular_framework_benchmark.experiments.experiment_file import load_experim
 from modular_framework_benchmark.experiments.metric_choices import read_metrics
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.metrics.registry import METRICS
+from modular_framework_benchmark.predicates.conditions import HeldFor, InRegion, Lifted, NoContact, On, Region, Upright
+from modular_framework_benchmark.predicates.predicate import All, Any, InOrder, Not
+from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, MetricKind
 from modular_framework_core.files.faults import FaultList
@@ -65,6 +68,123 @@ def test_a_listed_method_without_another_one_to_compare_with_is_a_fault(tmp_path
     )
     (fault,) = faults_of(PICK + listed, tmp_path)
     assert "object cube, planner PRM has only method 'above'; add another one to compare it with" in fault
+
+
+PROGRESS = "progress: [{held_for: {}, name: grasped}, {lifted: {height: 0.2}, weight: 2}]"
+REGIONS = "regions: {goal: {x: [0, 0.2], y: [0.4, 0.6]}, away: {x: [-0.3, -0.1], y: [0.4, 0.6]}}"
+
+
+def test_predicates_and_milestones_are_about_the_first_object_unless_they_name_another(tmp_path: Path) -> None:
+    text = PICK.replace(
+        "success: {lifted: 0.1}",
+        f"""{PROGRESS}
+{REGIONS}
+success:
+  in_region: {{region: goal}}
+  any: [{{on: {{support: table}}}}, {{not: {{upright: {{}}, no_contact: {{other: table}}}}}}]
+  in_order: [{{held_for: {{duration: 1}}}}, {{no_contact: {{}}}}]
+  hold_time: 1
+""",
+    )
+    found = {one.configuration["object"]: one.settings for one in read(text, tmp_path).combinations}
+    settings = found["ball"]
+    assert settings.success.hold_s == 1.0 and not settings.success.is_pick
+    goal = Region(name="goal", x=(0.0, 0.2), y=(0.4, 0.6))
+    resting = Any((
+        On(object="ball_1", support="table"),
+        Not(All((Upright(object="ball_1"), NoContact(object="ball_1", other="table")))),
+    ))  # fmt: skip
+    released = InOrder((HeldFor(object="ball_1", duration=1.0), NoContact(object="ball_1")))
+    assert settings.success.required == All((InRegion(object="ball_1", region=goal), resting, released))
+    assert settings.progress == (
+        Milestone(name="grasped", predicate=HeldFor(object="ball_1")),
+        Milestone(name="lifted", predicate=Lifted(object="ball_1", height=0.2), weight=2.0),
+    )
+    assert found["cube"].progress[0].predicate == HeldFor(object="cube_1")
+
+
+def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
+    text = PICK.replace("{lifted: 0.1}", "{lifted: 0.1, upright: {angle: 0.3}}")
+    success = read(text, tmp_path).combinations[0].settings.success
+    pick = (Lifted(object="cube_1", height=0.1), HeldFor(object="cube_1"))
+    assert success.predicate("cube_1") == All((*pick, Upright(object="cube_1", angle=0.3)))
+
+
+@pytest.mark.parametrize(
+    ("success", "at", "fault"),
+    [
+        ("{liftd: {}}", "liftd", "the key of success 'liftd' is unknown; allowed: lifted, hold_time, shake, object,"),
+        ("{on: {}}", "{}", "on needs the key 'support'; add it"),
+        ("{on: {support: tabel}}", "tabel", "support of on 'tabel' is unknown; allowed: cube_1, ball_1, ground_plane, "
+         "table; did you mean 'table'?"),
+        ("{upright: {object: cub_1}}", "cub_1", "object of upright 'cub_1' is unknown; allowed: cube_1, ball_1;"),
+        ("{object: cub_1}", "cub_1", "the object of success 'cub_1' is unknown; allowed: cube_1, ball_1; did you mean"),
+        ("{in_region: {region: gaol}}", "gaol", "region of in_region 'gaol' is unknown; allowed: goal, away; did you"),
+        ("{upright: {angel: 0.1}}", "angel", "the key of upright 'angel' is unknown; allowed: duration, object, angle; "
+         "did you mean 'angle'?"),
+        ("{upright: {angle: 4}}", "4", "angle of upright must be a number from 0 to 3.1416, found the number 4"),
+        ("{held_for: {duration: -1}}", "-1", "duration of held_for must be a number from 0 to 3600"),
+        ("{stacked: {objects: [cube_1]}}", "{objects", "stacked needs at least two objects, the lowest first"),
+        ("{aligned: {position: [0, 1]}}", "[0", "position of aligned has 2 numbers; allowed: 3"),
+        ("{all: {upright: {}}}", "{upright", "all must be a list such as [{on: {support: table}}, ...], found a"),
+        ("{all: [{uprigt: {}}]}", "uprigt", "the predicate 'uprigt' is unknown; allowed: lifted, held_for, in_region"),
+        ("{not: {}}", "{}", "a predicate of not has no predicate; add one"),
+        ("{all: [{in_region: {region: goal}}, {in_region: {region: away}}], shake: 1}", "{all",
+         "success contradicts itself: 'cube_1' is in the region 'goal', but 'cube_1' is in the region 'away'"),
+        ("{held_for: {}, no_contact: {}}", "{held_for", "success contradicts itself: 'cube_1' is in the gripper, but"),
+        ("{lifted: {height: 0.2}, not_moved: {}}", "{lifted", "success contradicts itself: 'cube_1' is more than"),
+        ("{upright: {}, not: {upright: {}}}", "{upright", "success contradicts itself: 'cube_1' stands upright, but"),
+        ("{on: {support: cube_1}}", "{on", "success contradicts itself: 'cube_1' lies on 'cube_1' names"),
+    ],
+)  # fmt: skip
+def test_a_wrong_predicate_is_refused_with_its_place_and_the_nearest_name(
+    success: str, at: str, fault: str, tmp_path: Path
+) -> None:
+    text = PICK.replace("{model: $object,", "{model: cube, z: 1}\n  - {model: $object,").replace(
+        "[cube, ball]", "[ball]"
+    )
+    text = text.replace("success: {lifted: 0.1}", f"{REGIONS}\nsuccess: {success}")
+    (found,) = faults_of(text, tmp_path)
+    line, column, message = found.split(":", 2)
+    assert text.splitlines()[int(line) - 1][int(column) - 1 :].startswith(at)
+    assert message.strip().startswith(fault)
+
+
+@pytest.mark.parametrize(
+    ("progress", "at", "fault"),
+    [
+        ("[]", "[]", "progress must be a list such as"),
+        ("[{name: grasped}]", "{name", "a milestone of progress has no predicate; add one"),
+        ("[{held_for: {}, weigt: 1}]", "weigt", "the key of a milestone 'weigt' is unknown; allowed: name, weight"),
+        ("[{held_for: {}, weight: -1}]", "-1", "weight must be a number from 0 to 1e+06, found the number -1"),
+        ("[{held_for: {}, weight: 0}]", "[", "every weight of progress is 0; make one of them greater"),
+        ("[{held_for: {}}, {upright: {}}, {held_for: {}}]", "{held_for", "two milestones have the name 'held_for'"),
+        ("[{lifted: {height: 0.2}}, {lifted: {height: 0.1}, name: low}]", "{lifted", "milestone 'low' is always"),
+        ("[{held_for: {}, no_contact: {}}]", "{held_for", "a milestone of progress contradicts itself: 'cube_1' is in"),
+    ],
+)  # fmt: skip
+def test_milestones_that_contradict_or_repeat_each_other_are_refused(
+    progress: str, at: str, fault: str, tmp_path: Path
+) -> None:
+    text = PICK.replace("[cube, ball]", "[cube]").replace("success:", f"progress: {progress}\nsuccess:")
+    (found,) = faults_of(text, tmp_path)
+    line, column, message = found.split(":", 2)
+    assert text.splitlines()[int(line) - 1][int(column) - 1 :].startswith(at)
+    assert message.strip().startswith(fault)
+
+
+@pytest.mark.parametrize(
+    ("regions", "fault"),
+    [
+        ("{goal: {x: [0, 1]}}", "the region 'goal' has no y; add [LOW, HIGH] [m]"),
+        ("{goal: {x: [1, 0], y: [0, 1]}}", "x of region 'goal' is [1.0, 0.0]; allowed: [LOW, HIGH] with LOW < HIGH"),
+        ("{goal: {x: [0, 1], y: [0, 1], hight: [0, 1]}}", "the key of a region 'hight' is unknown; allowed: x, y, z"),
+        ("[goal]", "regions must be a mapping such as {goal:"),
+    ],
+)
+def test_a_wrong_region_is_refused(regions: str, fault: str, tmp_path: Path) -> None:
+    (found,) = faults_of(PICK + f"\nregions: {regions}\n", tmp_path)
+    assert fault in found
 
 
 @pytest.mark.parametrize(

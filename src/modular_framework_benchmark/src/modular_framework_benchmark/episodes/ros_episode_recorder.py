@@ -28,11 +28,19 @@ from modular_framework_benchmark.episodes.bag import NODE as BAG_NODE
 from modular_framework_benchmark.episodes.bag import BagRecording
 from modular_framework_benchmark.episodes.errors import BagError, EpisodeAbortedError
 from modular_framework_benchmark.episodes.process_times import processor_time_s
-from modular_framework_benchmark.episodes.ros_recording import model_samples, write_parameters, write_recording
+from modular_framework_benchmark.episodes.ros_recording import write_parameters, write_recording
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
-from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, InterferenceError, WorldError, judge, spawn
+from modular_framework_benchmark.episodes.ros_world import (
+    SPAWN_SERVICE,
+    InterferenceError,
+    WorldError,
+    begin_world_record,
+    end_world_record,
+    judge,
+    spawn,
+)
 from modular_framework_benchmark.records.episode_settings import PlacedObject, from_json
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
@@ -131,7 +139,8 @@ class EpisodeRecorder:
                 if not self._samples.ends:
                     self._stop_task()
             spawned = {placed.name: placed.model for placed in request.objects}
-            answer |= write_recording(folder, self._samples, spawned, answer, rate_hz)
+            world = end_world_record(must_answer=not {"aborted", "foul"} & set(answer))
+            answer |= write_recording(folder, self._samples, world, spawned=spawned, answer=answer, rate_hz=rate_hz)
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]
@@ -165,6 +174,7 @@ class EpisodeRecorder:
 
         def spawn_all() -> None:
             self._samples.clear()
+            begin_world_record()
             answer["zero"] = self._now()
             for placed in request.objects:
                 spawn(placed)
@@ -207,8 +217,7 @@ class EpisodeRecorder:
 
     def _check(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
         """Checks after the hold time which object is held, and shakes it if requested."""
-        if request.target:
-            self._time.sleep(request.hold_s)
+        self._time.sleep(request.hold_s)
         answer["checked_s"] = self._now() - answer["zero"]
         judged, begin = judge(), answer.pop("begin_poses")
         answer["held"] = bool(request.target) and request.target in judged.held
@@ -221,12 +230,8 @@ class EpisodeRecorder:
                 answer["shake_fault"] = str(error)
         answer["simulated_s"] = self._now() - answer["zero"]
         latest_s = answer["zero"] + answer["simulated_s"] - SAMPLE_S
-        models = model_samples(answer["zero"], answer["simulated_s"])[1] if self._time.enabled else 0
         samples = self._samples
-        wait_until(
-            lambda: samples.latest_s() >= latest_s and len(samples.models) >= models and samples.actions_ended(),
-            SAMPLES_TIMEOUT_S,
-        )
+        wait_until(lambda: samples.latest_s() >= latest_s and samples.actions_ended(), SAMPLES_TIMEOUT_S)
         answer["foul"] = judge().interference(answer["interventions"]) or self._samples.interference()
         self._store_part_end(request, answer, "checked")
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the recording of an episode: `trajectory.parquet`, `tracking.parquet` and `recording.json`."""
+"""Writes the recording of an episode: trajectories, the record of the world, and the reports of components."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,25 +16,44 @@ import rospy
 from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
-from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECORDING, TRACKING, TRAJECTORY
-from modular_framework_ros.reported_figures import ATTEMPTS, CLEARANCE, CONCURRENT, PLANNING_TIME, PROCESSOR_TIME
+from modular_framework_benchmark.metrics.recording_files import (
+    PARAMETERS,
+    RECORDING,
+    TRACKING,
+    TRAJECTORY,
+    WORLD_RECORD,
+)
+from modular_framework_benchmark.predicates.world_track import read_world
+from modular_framework_ros.reported_figures import (
+    ATTEMPTS,
+    CLEARANCE,
+    CONCURRENT,
+    PLANNING_TIME,
+    PROCESSOR_TIME,
+)
 
 VARYING_PARAMETERS = ("run_id", "roslaunch", "seed")
 """Parameters that differ between episodes of the same configuration."""
 
-MODELS_PERIOD_S = 0.02
 TIME_TOLERANCE_S = 1e-6
 POSE_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def write_recording(
-    folder: Path, samples: Samples, spawned: Mapping[str, str], answer: Mapping[str, Any], rate_hz: float | None
+    folder: Path,
+    samples: Samples,
+    world: Mapping[str, Any],
+    *,
+    spawned: Mapping[str, str],
+    answer: Mapping[str, Any],
+    rate_hz: float | None,
 ) -> dict[str, Any]:
     """Writes the files of an episode.
 
     Args:
         folder: Folder of the files.
         samples: Collected messages.
+        world: Record of the world by the simulation.
         spawned: Models of the spawned objects, keyed by object name.
         answer: `origin_s`: ROS time at the start of the recording [s]; `checked_s`, `simulated_s`: time of the success
             check and of the end [s since the start of the recording].
@@ -47,7 +65,8 @@ def write_recording(
         `recording_fault`: description of missing samples, "" if complete.
     """
     origin_s, end_s = float(answer["zero"]), float(answer.get("simulated_s", np.inf))
-    poses = _object_poses(samples, list(spawned), answer)
+    (folder / WORLD_RECORD).write_text(json.dumps(world))
+    poses = _object_poses(world, origin_s)
     tracking = _within_episode(_tracking(samples, origin_s), end_s)
     joints = samples.joints if rate_hz is None else periodic_joint_states(samples.joints, rate_hz)
     trajectory = _with_objects(
@@ -66,15 +85,7 @@ def write_recording(
     final = {name: _pose_at(rows, checked_s) for name, rows in poses.items() if len(rows)}
     missing = 0 if rate_hz is None else count_missing_samples(trajectory["time_s"].to_numpy() + origin_s, rate_hz)
     faults = [f"{missing} of {len(trajectory) + missing} joint states did not arrive"] if missing else []
-    if rate_hz is not None and math.isfinite(end_s):
-        faults += _model_faults(len(_model_messages(samples, spawned)), model_samples(origin_s, end_s)[1])
     return {"final": final, "recording_fault": "; ".join(faults)}
-
-
-def _model_faults(received: int, expected: int) -> list[str]:
-    if received == expected:
-        return []
-    return [f"{received} messages of the models arrived instead of {expected}: their poses have times of arrival"]
 
 
 def write_parameters(folder: Path) -> tuple[dict[str, Any], str]:
@@ -104,48 +115,15 @@ def _pose_at(rows: pd.DataFrame, time_s: float) -> list[float]:
     return [float(rows[column].iloc[row]) for column in POSE_COLUMNS]
 
 
-def _object_poses(samples: Samples, names: Sequence[str], answer: Mapping[str, Any]) -> dict[str, pd.DataFrame]:
+def _object_poses(world: Mapping[str, Any], origin_s: float) -> dict[str, pd.DataFrame]:
     """Returns the poses of all models by name; a model at rest has one row."""
-    messages = _model_messages(samples, names)
-    rows: dict[str, list[tuple[float, ...]]] = {}
-    for time_s, (_, message) in zip(_sample_times(messages, answer), messages, strict=True):
-        for name, pose in zip(message.name, message.pose, strict=True):
-            position, orientation = pose.position, pose.orientation
-            rows.setdefault(name, []).append(
-                (time_s, position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
-            )
-    frames = {name: pd.DataFrame(found, columns=["time_s", *POSE_COLUMNS]) for name, found in rows.items()}
-    return {
-        name: frame if len(frame[list(POSE_COLUMNS)].drop_duplicates()) > 1 else frame.iloc[[0]]
-        for name, frame in frames.items()
-    }
-
-
-def _model_messages(samples: Samples, names: Collection[str]) -> list[tuple[float, Any]]:
-    """Returns the messages with all objects; a message from before the episode lacks some."""
-    return [(stamp, message) for stamp, message in samples.models if set(names) <= set(message.name)]
-
-
-def model_samples(origin_s: float, end_s: float) -> tuple[int, int]:
-    """Returns the index of the first sample of the models in an episode, and the number of samples.
-
-    The simulation publishes at multiples of `MODELS_PERIOD_S`.
-
-    Args:
-        origin_s: ROS time at the start of the recording [s].
-        end_s: End of the recording [s since its start].
-    """
-    first = math.floor(origin_s / MODELS_PERIOD_S + TIME_TOLERANCE_S) + 1
-    return first, math.floor((origin_s + end_s) / MODELS_PERIOD_S + TIME_TOLERANCE_S) - first + 1
-
-
-def _sample_times(messages: Sequence[tuple[float, Any]], answer: Mapping[str, Any]) -> list[float]:
-    """Returns the times of unstamped world messages: by count, or by arrival if a message was lost."""
-    origin_s = float(answer["zero"])
-    first, count = model_samples(origin_s, float(answer.get("simulated_s", -1.0)))
-    if len(messages) == count:
-        return [(first + number) * MODELS_PERIOD_S - origin_s for number in range(count)]
-    return [stamp - origin_s for stamp, _ in messages]
+    track = read_world(world, origin_s, -np.inf, np.inf)
+    frames = {}
+    for name, body in track.bodies.items():
+        rows = np.column_stack([track.times_s, body.positions, body.quaternions])
+        frame = pd.DataFrame(rows, columns=["time_s", *POSE_COLUMNS]).dropna()
+        frames[name] = frame if len(frame[list(POSE_COLUMNS)].drop_duplicates()) > 1 else frame.iloc[[0]]
+    return frames
 
 
 def _tracking(samples: Samples, origin_s: float) -> pd.DataFrame:

@@ -14,7 +14,6 @@ import rosgraph
 import roslib.message
 import rospy
 from control_msgs.msg import JointControllerState, JointTrajectoryControllerState
-from gazebo_msgs.msg import ModelStates
 from moveit_msgs.msg import DisplayTrajectory
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -42,7 +41,6 @@ class Samples:
 
     Attributes:
         joints: Joint states.
-        models: (simulated time [s], gazebo_msgs/ModelStates).
         controllers: (name of the controller, state).
         set_points: (joint, control_msgs/JointControllerState) of single-joint controllers, such as a gripper's.
         planning: (real time [s], report of move_group).
@@ -64,7 +62,6 @@ class Samples:
         """Removes all collected messages."""
         with self._lock:
             self.joints: list[Any] = []
-            self.models: list[tuple[float, Any]] = []
             self.ends: list[dict[str, Any]] = []
             self.forgeries: set[tuple[str, str]] = set()
             self.controllers: list[tuple[str, Any]] = []
@@ -98,8 +95,9 @@ class Samples:
         """Subscribes to all present topics; repeated calls add new topics."""
         for topic, kind, owner, callback in (
             ("joint_states", JointState, SIMULATION_NODE, lambda message: self.joints.append(message)),
-            (MODELS, ModelStates, SIMULATION_NODE, lambda message: self.models.append((rospy.get_time(), message))),
-            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # only to detect other publishers
+            # The simulation records its world itself; these two are only to detect other publishers.
+            (MODELS, rospy.AnyMsg, SIMULATION_NODE, lambda _: None),
+            (GRASPED, String, SIMULATION_NODE, lambda _: None),
             (TASK_STATUS, String, TASK_NODE, self._on_status),
             ("component_reports", String, "", lambda message: self.components.append(_timed_report(message))),
             (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_timed_report(message))),

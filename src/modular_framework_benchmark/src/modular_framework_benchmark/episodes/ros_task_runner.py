@@ -16,7 +16,10 @@ from modular_framework_benchmark.episodes.episode_video import make_video_apart
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.episodes.stack import Stack, StackError, StackLaunch
-from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
+from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.metrics.recording_files import read_stage
+from modular_framework_benchmark.predicates.predicate import Stage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import SettingsError
 
@@ -122,7 +125,7 @@ class TaskEpisodeRunner:
             return end.broken(stack.root_cause(str(answer["fault"])))
         if answer.get("foul"):
             return end.ended(EpisodeStatus.INVALID, str(answer["foul"]), answer)
-        cause = _failure(settings.success, end.target, answer)
+        cause = _failure(settings, end.target, answer, read_stage(end.folder, answer))
         return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
 
 
@@ -149,24 +152,20 @@ def _empty(folder: Path) -> None:
             path.unlink()
 
 
-def _failure(wanted: SuccessCriteria, target: str, answer: Mapping[str, Any]) -> str:
+def _failure(settings: TaskSettings, target: str, answer: Mapping[str, Any], stage: Stage | None) -> str:
     """Returns why an episode whose task ended did not succeed; "" after a success.
 
     Args:
-        wanted: Success criteria.
-        target: Name of the object to be lifted and held; "" if the outcome of the task suffices.
+        settings: Settings of the episode.
+        target: Name of the object to be lifted and held in the short form of the success criteria.
         answer: Answer of the recorder.
+        stage: True states of the world from the start of the task to the check; None without a record.
     """
     if not answer["task_succeeded"]:
         return str(answer["reason"]) or f"the task ended with outcome '{answer['outcome']}'"
-    if not target:
+    if settings.success == NO_CRITERIA:
         return ""
-    lifted, held = answer["lifted"].get(target), bool(answer["held"])
-    if lifted is None:
-        return f"there is no object '{target}' in the world; 'success' must name an object of the episode"
-    if lifted > wanted.lifted_m and held:
-        return ""
-    return (
-        f"the task claims success, but '{target}' is {lifted:.3f} m higher {wanted.hold_s:g} s later "
-        f"(wanted: more than {wanted.lifted_m:g} m) and {'still' if held else 'not'} in the gripper"
-    )
+    if stage is None:
+        return "the simulation recorded no states of the world, so that success cannot be judged"
+    unmet = settings.success.predicate(target).unmet(stage)
+    return f"the task claims success, but {settings.success.hold_s:g} s later {' and '.join(unmet)}" if unmet else ""

@@ -13,14 +13,20 @@ import rosgraph
 import rospy
 from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from std_srvs.srv import Trigger, TriggerRequest
+from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
 from modular_framework_benchmark.records.episode_settings import PlacedObject
-from modular_framework_ros.calls import request_service
+from modular_framework_ros.calls import CallError, request_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
-SPAWN_SERVICE, REFEREE_SERVICE = "/gazebo/spawn_sdf_model", "/gazebo/referee"
+SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE = (
+    "/gazebo/spawn_sdf_model",
+    "/gazebo/referee",
+    "/gazebo/record_world",
+)
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
+ABORTED_TIMEOUT_S = 5.0
+"""Wait for the record of an episode that was aborted, whose simulation may hang [s]."""
 SERVICE_TIMEOUT_S = 60.0  # long enough for a convex decomposition of a mesh
 
 
@@ -87,14 +93,48 @@ def judge() -> Judgement:
         InterferenceError: Another node offers the referee's service.
         WorldError, CallError: The simulation does not answer.
     """
+    return Judgement(**json.loads(_ask_simulation(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)))
+
+
+def begin_world_record() -> None:
+    """Begins a record of the world in the simulation.
+
+    Raises:
+        InterferenceError: Another node offers the service.
+        WorldError, CallError: The simulation does not answer.
+    """
+    _ask_simulation(RECORD_SERVICE, SetBool, SetBoolRequest(data=True), SERVICE_TIMEOUT_S)
+
+
+def end_world_record(must_answer: bool) -> dict[str, Any]:
+    """Ends the record of the world and returns it.
+
+    Args:
+        must_answer: Whether a missing answer is an error; otherwise the record is then empty.
+
+    Raises:
+        InterferenceError: Another node offers the service.
+        WorldError, CallError: The simulation does not answer.
+    """
+    timeout_s = SERVICE_TIMEOUT_S if must_answer else ABORTED_TIMEOUT_S
+    try:
+        return dict(json.loads(_ask_simulation(RECORD_SERVICE, SetBool, SetBoolRequest(data=False), timeout_s)))
+    except (WorldError, CallError):
+        if must_answer:
+            raise
+        return {"samples": [], "boxes": {}, "robots": []}
+
+
+def _ask_simulation(service: str, kind: Any, request: Any, timeout_s: float) -> str:
+    """Returns the message with which the simulation answers; no other node may answer in its place."""
     services = rosgraph.Master(rospy.get_name()).getSystemState()[2]
-    nodes = next((nodes for name, nodes in services if name == REFEREE_SERVICE), [])
+    nodes = next((nodes for name, nodes in services if name == service), [])
     if nodes and nodes != [SIMULATION_NODE]:
-        raise InterferenceError(f"'{REFEREE_SERVICE}' is answered by '{', '.join(nodes)}', not by the simulation")
-    response = request_service(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)
+        raise InterferenceError(f"'{service}' is answered by '{', '.join(nodes)}', not by the simulation")
+    response = request_service(service, kind, request, timeout_s)
     if not response.success:
-        raise WorldError(f"the simulation does not judge the world: {response.message}")
-    return Judgement(**json.loads(response.message))
+        raise WorldError(f"the simulation does not answer '{service}': {response.message}")
+    return str(response.message)
 
 
 def _description(model: str) -> str:

@@ -65,6 +65,17 @@ class ResourceLookup(Protocol):
             UnresolvedReference: The model does not exist.
         """
 
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
+        """Returns the names of the models in the world of a launch.
+
+        Args:
+            launch: Launch file with the arguments `description_package` and `world_file`.
+            arguments: Arguments of the launch file.
+
+        Raises:
+            UnresolvedReference: The world does not exist or is invalid.
+        """
+
     def package(self, name: str) -> Path:
         """Returns the folder of a ROS package.
 

@@ -21,6 +21,9 @@ from modular_framework_core.launching.launch_arguments import (
 )
 from modular_framework_core.launching.launch_values import file_faults
 from modular_framework_ros.allowed_names import listing, nearest
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.sdf_reader import read_world
+from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 
 
 class RosResourceLookup:
@@ -100,15 +103,31 @@ class RosResourceLookup:
         there = sorted(found.parent.name for found in models.glob("*/model.sdf"))
         raise UnresolvedReference(f"there is no model '{name}'; {listing(there)}{nearest(name, there)}")
 
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
+        """Returns the names of the models in the world of a launch."""
+        description = self._description(launch, arguments)
+        file = self._launch_values(launch, arguments).get("world_file", "")
+        return _models_of(description / "worlds" / file, description / "models") if file else ()
+
     def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
-        path = str(self.launch_file(launch))
-        values = _values(path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value))
-        package = values.get("description_package", "")
+        package = self._launch_values(launch, arguments).get("description_package", "")
         if not package:
             raise UnresolvedReference(
                 f"{launch} has no argument description_package to find models by name; give the path of the model"
             )
         return self.package(package)
+
+    def _launch_values(self, launch: str, arguments: Mapping[str, str]) -> dict[str, str]:
+        path = str(self.launch_file(launch))
+        return _values(path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value))
+
+
+@lru_cache(maxsize=64)
+def _models_of(world: Path, models: Path) -> tuple[str, ...]:
+    try:
+        return tuple(model.name for model in read_world(world, Resources((models,), no_packages)).models)
+    except DescriptionError as error:
+        raise UnresolvedReference(f"the world cannot be read: {error}") from error
 
 
 @lru_cache(maxsize=256)

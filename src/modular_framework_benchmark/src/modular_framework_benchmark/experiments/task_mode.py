@@ -11,9 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting
+from modular_framework_benchmark.experiments.predicate_reading import KnownNames, PredicateReading, read_regions
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
+from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA, SuccessCriteria
+from modular_framework_benchmark.predicates.conditions import Region
+from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, PlacedObject, SettingsError
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.key_spelling import intended_key
@@ -91,50 +95,9 @@ def _read_extra_parameters(reading: Reading, node: Node, key: str) -> tuple[str,
     return tuple(name for item in items if (name := reading.text(item, f"a name in {key}")) is not None)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SuccessCriteria:
-    """Success criteria for the final state of the world; without any, the outcome of the task suffices.
-
-    Attributes:
-        object: Name of the object to be lifted and held; None for the first object.
-        lifted: Minimum height above the initial height [m]; None for 0.1 m.
-        hold_time: Simulated time between the end of the task and the check [s]; None for 2 s.
-        shake: Simulated duration of the shake after the check [s]; None for no shake.
-    """
-
-    object: str | None = None
-    lifted: float | None = None
-    hold_time: float | None = None
-    shake: float | None = None
-
-    @property
-    def lifted_m(self) -> float:
-        """Returns the minimum height [m]."""
-        return 0.1 if self.lifted is None else self.lifted
-
-    @property
-    def hold_s(self) -> float:
-        """Returns the time before the check [s]."""
-        return 2.0 if self.hold_time is None else self.hold_time
-
-
-NO_CRITERIA = SuccessCriteria()
-MAX_CRITERIA = {"lifted": 10.0, "hold_time": 3600.0}
-"""Largest values in experiment files."""
-
-
-def _read_success(reading: Reading, node: Node, key: str) -> SuccessCriteria | None:
-    mapping = reading.mapping(node, key, "{lifted: 0.10, hold_time: 2.0}")
-    known = (*MAX_CRITERIA, "object")
-    found: dict[str, Any] = {}
-    for name, value in mapping.entries.items() if mapping is not None else ():
-        if name not in known:
-            reading.faults.add_unknown(mapping.keys[name], f"the key of {key}", name, known)  # type: ignore[union-attr]
-        elif name == "object":
-            found[name] = reading.text(value, name)
-        else:
-            found[name] = reading.number(value, name, 0.0, MAX_CRITERIA[name])
-    return None if mapping is None else SuccessCriteria(**found)
+def _read_later(reading: Reading, node: Node, key: str) -> Any:
+    """Returns a value that `_finish` replaces, once the names of objects and models are known."""
+    return NO_CRITERIA if key == "success" else ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +112,9 @@ class TaskSettings(EpisodeSettings):
         objects: Objects to spawn before the task starts.
         warm: Whether the stack may be reused.
         task: Task script; "" for the default of the launch file.
+        regions: Regions that predicates name.
         success: Success criteria.
+        progress: Milestones in their order.
     """
 
     launch: str = setting(_read_launch, DEFAULT_LAUNCH)
@@ -159,16 +124,20 @@ class TaskSettings(EpisodeSettings):
     objects: tuple[PlacedObject, ...] = setting(read_objects, ())
     warm: bool = setting(Reading.truth, True)
     task: str = setting(_read_task, "")
-    success: SuccessCriteria = setting(_read_success, NO_CRITERIA)
+    regions: tuple[Region, ...] = setting(read_regions, ())
+    success: SuccessCriteria = setting(_read_later, NO_CRITERIA)
+    progress: tuple[Milestone, ...] = setting(_read_later, ())
 
     @property
     def judged_object(self) -> str:
-        """Name of the object to be lifted and held; "" if the outcome of the task suffices.
+        """Name of the object that grasp metrics describe; "" if no object is judged.
 
         Raises:
-            SettingsError: There are success criteria, but no objects.
+            SettingsError: An object must be lifted and held, but there are no objects.
         """
-        if self.success == NO_CRITERIA:
+        if self.success == NO_CRITERIA and not self.progress:
+            return ""
+        if self.success.object is None and not self.objects and not self.success.is_pick:
             return ""
         if self.success.object is None and not self.objects:
             raise SettingsError(
@@ -190,34 +159,50 @@ def _finish(
     `arguments` is unreadable if an invalid argument leaves the launched nodes unknown.
     """
     if "launch" in read.unreadable:
-        return read
+        return _judged(read, KnownNames(), reading)
     settings = read.settings
     try:
         known = reading.resources.launch_arguments(settings.launch)
     except UnresolvedReference as error:
         reading.faults.add(_location_of(read.node, "launch"), str(error))
-        return replace(read, unreadable=read.unreadable | {"launch"})
+        return _judged(replace(read, unreadable=read.unreadable | {"launch"}), KnownNames(), reading)
     sound, decides = _sound_arguments(read.node, settings.launch, settings.arguments, known, reading)
     task = settings.task
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
-    before = len(reading.faults)
     objects = placed_objects(nodes, settings.launch, sound, reading)
-    if len(reading.faults) == before and "objects" not in read.unreadable:
-        _check_success(read, [found.name for found in objects], reading)
+    if "objects" in read.unreadable or len(objects) < len(nodes):
+        names = KnownNames()
+    else:
+        names = KnownNames(tuple(found.name for found in objects), _world_models(read, settings.launch, sound, reading))
     settings = replace(settings, arguments=sound if decides else {}, task=task)
-    read = replace(read, settings=settings, objects=tuple(objects))
+    read = _judged(replace(read, settings=settings, objects=tuple(objects)), names, reading)
     return read if decides else replace(read, unreadable=read.unreadable | {"arguments"})
 
 
-def _check_success(read: ReadSettings[TaskSettings], names: list[str], reading: Reading) -> None:
-    success = read.settings.success
-    if success.object is not None and success.object not in names:
-        location = _location_of(read.node, "success")
-        reading.faults.add_unknown(location, "the object of success", success.object, names)
-    elif success != NO_CRITERIA and not names:
-        text = "success names an object, but objects is empty; add it there"
-        reading.faults.add(_location_of(read.node, "success"), text)
+def _world_models(
+    read: ReadSettings[TaskSettings], launch: str, arguments: Map[str, str], reading: Reading
+) -> Sequence[str] | None:
+    """Returns the names of the models of the world if predicates need them; None if the world is unknown."""
+    if not {"success", "progress"} & set(read.node.entries):
+        return ()
+    try:
+        return reading.resources.world_models(launch, arguments)
+    except UnresolvedReference:
+        return None
+
+
+def _judged(read: ReadSettings[TaskSettings], names: KnownNames, reading: Reading) -> ReadSettings[TaskSettings]:
+    """Returns the settings with their success criteria and milestones."""
+    regions = {region.name: region for region in read.settings.regions}
+    predicates = PredicateReading(reading, replace(names, regions=regions))
+    found: dict[str, Any] = {}
+    for key, reader in (("success", predicates.success), ("progress", predicates.progress)):
+        if key in read.node.entries:
+            found[key] = reader(read.node.entries[key], key)
+    unreadable = {key for key, value in found.items() if value is None}
+    settings = replace(read.settings, **{key: found[key] for key in found.keys() - unreadable})
+    return replace(read, settings=settings, unreadable=read.unreadable | unreadable)
 
 
 def _sound_arguments(

@@ -7,6 +7,7 @@
 | `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
 | `parameters.json` | all parameters of the parameter server |
 | `recording.json` | objects, grasps and reports of the components |
+| `world.json` | record of the world by the simulation, as `read_world` reads it |
 
 `time_s` is simulated time since the start of the recording.
 """
@@ -29,10 +30,12 @@ from modular_framework_benchmark.metrics.measurements import (
     ObjectTrack,
     TrackingSamples,
 )
+from modular_framework_benchmark.predicates.stages import SimulatedStage
+from modular_framework_benchmark.predicates.world_track import read_world
 from modular_framework_ros.reported_figures import declared
 
 TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
-PARAMETERS = "parameters.json"
+PARAMETERS, WORLD_RECORD = "parameters.json", "world.json"
 
 
 def read_recording(folder: Path) -> dict[str, Any]:
@@ -46,6 +49,22 @@ def read_descriptions(folder: Path) -> tuple[str, str]:
     path = folder / PARAMETERS
     parameters = json.loads(path.read_text()) if path.is_file() else {}
     return str(parameters.get("robot_description", "")), str(parameters.get("robot_description_semantic", ""))
+
+
+def read_stage(folder: Path, answer: Mapping[str, Any]) -> SimulatedStage | None:
+    """Returns the true states of the world from the start of the task to its check; None if the task did not start.
+
+    Args:
+        folder: Folder of the episode's files.
+        answer: `zero`: simulated time at the start of the recording [s]; `task_started_s`, `checked_s`: start of the
+            task and its check [s since the start of the recording], absent if they were not reached.
+    """
+    path = folder / WORLD_RECORD
+    if "task_started_s" not in answer or not path.is_file():
+        return None
+    record, ended_s = json.loads(path.read_text()), float(answer.get("checked_s", np.inf))
+    world = read_world(record, float(answer["zero"]), float(answer["task_started_s"]), ended_s)
+    return SimulatedStage(world) if len(world.times_s) else None
 
 
 def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:
