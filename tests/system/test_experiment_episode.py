@@ -19,8 +19,12 @@ import pytest
 import rosgraph
 
 from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
-from modular_framework_benchmark.experiments.task_mode import SuccessCriteria, TaskSettings
+from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.registry import METRICS
+from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, NoContact, On
+from modular_framework_benchmark.predicates.predicate import Not
+from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import PlacedObject, RecordedFiles
 from modular_framework_core.launching.launch_session import processes_with
@@ -31,6 +35,12 @@ PICK = TaskSettings(
     arguments={"world_file": "ur5_table.world", "real_time_factor": "0"},
     objects=(PlacedObject("cube_1", "cube", 0.05, 0.5, 0.866, yaw=0.3),),
     success=SuccessCriteria(lifted=0.1, hold_time=1.0, shake=2.0),
+    progress=(
+        Milestone(name="touched", predicate=Not(NoContact(object="cube_1"))),
+        Milestone(name="grasped", predicate=HeldFor(object="cube_1", duration=0.2)),
+        Milestone(name="lifted", predicate=Lifted(object="cube_1", height=0.1), weight=2.0),
+        Milestone(name="put_back", predicate=On(object="cube_1", support="table")),
+    ),
     metrics=tuple(METRICS),
     time_limit=ENOUGH_S,
 )
@@ -86,6 +96,12 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
         *("generation", "planning", "execution", "grasp")
     }
     assert any(span.name == "MoveLift" for span in cold.spans if span.kind == "state")
+    assert cold.metrics["progress"] == pytest.approx(4 / 5)  # a pick does not put the cube back
+    milestones = [span for span in cold.spans if span.kind == "milestone"]
+    assert [span.name for span in milestones] == ["touched", "grasped", "lifted", "put_back"]
+    *reached_s, missed_s = [span.ended_s for span in milestones]
+    assert missed_s is None and milestones[0].started_s < reached_s[0] < reached_s[1] < reached_s[2] <= cold.simulated_s
+    assert [span.reason for span in milestones] == ["", "", "", "missed first"]
     assert cold.snapshot["seed"] == 7 and cold.snapshot["packages"]["ompl"] and cold.snapshot["machine"]["cores"]
 
     assert (tmp_path / "cold/episode.bag").read_bytes().startswith(b"#ROSBAG V2.0\n")

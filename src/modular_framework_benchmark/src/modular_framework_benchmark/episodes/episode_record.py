@@ -12,16 +12,20 @@ from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
 from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
     objects_of,
     read_descriptions,
     read_joints,
     read_recording,
+    read_stage,
     read_tracking,
     reports_of,
 )
 from modular_framework_benchmark.metrics.registry import measure
+from modular_framework_benchmark.predicates.progress import Progress, progress_of
+from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.results import COLD_START
@@ -104,6 +108,8 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     states = _state_spans(end)
     answer = end.answer
     joints = read_joints(end.folder)
+    stage = read_stage(end.folder, end.answer)
+    progress = _progress(end, stage)
     measurements = EpisodeMeasurements(
         settings=end.spec.settings,
         status=end.status,
@@ -123,11 +129,13 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         target=end.target,
         held=bool(answer.get("held", False)),
         shake=Shake(**answer["shake"]) if answer.get("shake") else None,
+        world=stage.world if stage is not None else None,
+        progress=progress,
         folder=end.folder,
     )
     measured = measure(end.spec.settings.metrics, measurements)
     invalid = end.status is EpisodeStatus.INVALID
-    spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording))
+    spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording), *_milestone_spans(progress))
     return EpisodeRecord(
         spec=end.spec,
         status=end.status,
@@ -141,6 +149,34 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         snapshot=_snapshot(end, measured.faults) | software.as_json(),
         folder=str(end.folder),
     )
+
+
+def _progress(end: EpisodeEnd, stage: SimulatedStage | None) -> Progress | None:
+    """Returns the progress of a measured episode with milestones; None for other episodes."""
+    settings = end.spec.settings
+    if end.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID) or stage is None:
+        return None
+    if not isinstance(settings, TaskSettings) or not settings.progress:
+        return None
+    return progress_of(settings.progress, stage)
+
+
+def _milestone_spans(progress: Progress | None) -> list[Span]:
+    """Returns a span per milestone, from the start of the task to the moment at which the milestone was reached."""
+    if progress is None:
+        return []
+    times_s = [*progress.times_s, *[None] * (len(progress.milestones) - len(progress.times_s))]
+    return [
+        Span(
+            "milestone",
+            milestone.name,
+            progress.started_s,
+            time_s,
+            failed=time_s is None,
+            reason="missed first" if milestone.name == progress.missed else "",
+        )
+        for milestone, time_s in zip(progress.milestones, times_s, strict=True)
+    ]
 
 
 def _hand(folder: Path, joints: JointSamples | None) -> ObjectTrack | None:

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from modular_framework_benchmark.predicates.progress import Progress
+from modular_framework_benchmark.predicates.world_track import WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.used_software import UsedSoftware
@@ -160,6 +162,8 @@ class EpisodeMeasurements:
         target: Name of the object in the success criteria; "" for none.
         held: Whether the target was in the gripper at the success check.
         shake: Shake of the object; None if not requested.
+        world: True states of the world from the start of the task to its check; None without a record.
+        progress: Milestones that were reached; None without milestones.
         folder: Folder of the episode's files.
     """
 
@@ -181,6 +185,8 @@ class EpisodeMeasurements:
     target: str = ""
     held: bool = False
     shake: Shake | None = None
+    world: WorldTrack | None = None
+    progress: Progress | None = None
     folder: Path | None = None
 
     def values_of(self, figure: Figure) -> list[float]:

@@ -17,6 +17,11 @@ def success(episode: EpisodeMeasurements) -> float | None:
     return float(episode.status is EpisodeStatus.SUCCEEDED)
 
 
+def progress(episode: EpisodeMeasurements) -> float | None:
+    """Weight of the milestones that the episode reached in order, as a fraction of all weights; None without any."""
+    return None if episode.progress is None else episode.progress.fraction
+
+
 def task_time(episode: EpisodeMeasurements) -> float | None:
     """Simulated time from the request for grasps to the end of the task [s]; None for an unsuccessful task.
 

@@ -66,12 +66,13 @@ class Span:
     """A part of an episode with a start and an end, for timelines and times per component.
 
     Attributes:
-        kind: `state` for a state of the task, `component` for generation, planning or execution.
-        name: Path of the state, or name of the component.
-        started_s: Start by the wall clock [s since the start of the episode].
-        ended_s: End [s since the start of the episode]; None if it never ended.
+        kind: `state` for a state of the task, `component` for generation, planning or execution, `milestone`.
+        name: Path of the state, or name of the component or milestone.
+        started_s: Start by the wall clock [s since the start of the episode]; for a milestone, start of the task in
+            simulated time [s since the start of the recording].
+        ended_s: End by the same clock; None if it never ended, or the milestone was not reached.
         outcome: Outcome of the state; "" for none.
-        failed: Whether the state or component failed.
+        failed: Whether the state or component failed, or the milestone was missed.
         reason: Reason for the failure; "" on success.
     """
 

@@ -28,6 +28,7 @@ class MetricKind(Enum):
     VALUE = "value"  # a number, such as a length
     COUNT = "count"  # a number of events, such as attempts
     TIME = "time"  # a duration, censored at a limit if the episode did not finish
+    PARTIAL_CREDIT = "partial_credit"  # how far the episode got, from 0 to 1; a failed episode has its own value
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +68,18 @@ class Metric:
         return self.clock in (Clock.WALL, Clock.PROCESSOR)
 
     @property
+    def is_fraction(self) -> bool:
+        """Returns whether the values are shown in percent."""
+        return self.kind in (MetricKind.RATE, MetricKind.PARTIAL_CREDIT)
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Returns the smallest and largest value of an episode, including the limit, in the metric's unit."""
         never_negative = self.kind in (MetricKind.COUNT, MetricKind.TIME)
         low = (0.0 if never_negative else -math.inf) if self.lowest is None else self.lowest
         high = math.inf if self.highest is None else self.highest
+        if self.kind is MetricKind.PARTIAL_CREDIT:
+            return 0.0, 1.0
         if self.limit is None:
             return low, high
         return (low, min(high, self.limit)) if self.better is Direction.LOWER else (max(low, self.limit), high)

@@ -8,7 +8,6 @@ from dataclasses import asdict
 
 import plotly.graph_objects as go
 
-from modular_framework_benchmark.records.experiment import MetricKind
 from modular_framework_benchmark.reports.figure_style import MUTED, NamedFigure, styled, unique_labels, words
 from modular_framework_benchmark.reports.html_page import render_page
 from modular_framework_benchmark.reports.number_text import counted, number_text, p_value_text
@@ -39,7 +38,7 @@ def changes_table(regression: Regression) -> Table:
 
 def _row(item: MetricChange) -> tuple[Cell, ...]:
     found = item.comparison
-    scale = 100.0 if item.metric.kind is MetricKind.RATE else 1.0
+    scale = 100.0 if item.metric.is_fraction else 1.0
     before, after = (
         number_text(None if value is None else scale * value, unit=item.metric.unit)
         for value in (found.second_estimate, found.first_estimate)

@@ -27,7 +27,12 @@ from modular_framework_benchmark.reports.run_record import (
     warnings_of,
 )
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary, choose_episodes, summarise_spans
-from modular_framework_benchmark.reports.success_figures import differences_figure, levels_figure, ranking_figure
+from modular_framework_benchmark.reports.success_figures import (
+    differences_figure,
+    levels_figure,
+    milestones_figure,
+    ranking_figure,
+)
 from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
@@ -151,7 +156,9 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     recorded = recorded_values(source.snapshots)
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods
+    episodes = {item.method: item.counts.episodes for item in analysis.summaries if item.metric == SUCCESS}
     figures = _comparison_figures(results, analysis) + _present(
+        milestones_figure(spans, {name: count for name, count in episodes.items() if count}),
         components_figure(spans, methods),
         levels_figure(levels, methods),
         timelines_figure(chosen, timelines),

@@ -20,16 +20,16 @@ MAX_TIMELINES = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpanSummary:
-    """Time of a state or component in the episodes of a method.
+    """Time of a state, a component or until a milestone in the episodes of a method.
 
     Attributes:
-        kind: `state` or `component`.
+        kind: `state`, `component` or `milestone`.
         name: Name of the state or component.
         method: Name of the method.
         runs: Number of runs.
-        failed: Number of failed runs.
+        failed: Number of failed runs, or of episodes that missed the milestone.
         unended: Number of runs that never ended and have no duration.
-        mean_s: Mean real time of ended runs [s]; NaN without ended runs.
+        mean_s: Mean real time of ended runs, or mean simulated time until the milestone [s]; NaN without ended runs.
         per_episode_s: Mean real time per episode with at least one run active [s].
     """
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -15,12 +15,15 @@ from modular_framework_benchmark.reports.figure_style import (
     MUTED,
     NamedFigure,
     axis_title,
+    color_of,
+    dash_of,
     label,
     styled,
     unique_labels,
     words,
 )
 from modular_framework_benchmark.reports.number_text import count_text, counted, percentage_text
+from modular_framework_benchmark.reports.span_tables import SpanSummary
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary
 
 MAX_ROWS = 60
@@ -131,6 +134,35 @@ def levels_figure(summaries: Sequence[MethodSummary], methods: Sequence[str]) ->
     if len(rows) > len(shown):
         summary += f" The first {len(shown)} of {counted(len(rows), 'level')} are drawn; the table has all."
     return NamedFigure("levels", "Success by level of the other factors", summary, figure)
+
+
+def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, int]) -> NamedFigure | None:
+    """Returns the fraction of each method's episodes that reached each milestone, or None without milestones.
+
+    Args:
+        spans: Spans by kind, name and method.
+        episodes: Number of finished episodes of each method; an episode without a record reached no milestone.
+    """
+    milestones = [item for item in spans if item.kind == "milestone"]
+    names = list(dict.fromkeys(item.name for item in milestones))
+    if not names:
+        return None
+    reached = {(item.method, item.name): item.runs - item.failed for item in milestones}
+    labels = unique_labels([words(name) for name in names], 24)
+    figure = go.Figure()
+    for index, (method, count) in enumerate(episodes.items()):
+        numbers = [reached.get((method, name), 0) for name in names]
+        figure.add_trace(
+            go.Scatter(
+                x=labels, y=[100.0 * number / count for number in numbers], name=label(method), mode="lines+markers",
+                customdata=numbers, line={"color": color_of(index), "dash": dash_of(index)}, marker={"size": 8},
+                hovertemplate=f"{label(method)}: %{{customdata}} of {count:,} episodes<extra></extra>",
+            )
+        )  # fmt: skip
+    styled(figure, height=380)
+    figure.update_yaxes(range=[-2, 102], title_text="episodes that reached it [%]")
+    summary = "Fraction of each method's finished episodes that reached each milestone, in the order of the task."
+    return NamedFigure("milestones", "How far", summary, figure)
 
 
 def level_words(levels: str) -> str:

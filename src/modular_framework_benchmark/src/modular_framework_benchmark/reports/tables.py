@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from modular_framework_benchmark.records.experiment import Metric, MetricKind
+from modular_framework_benchmark.records.experiment import Metric
 from modular_framework_benchmark.reports.figure_style import words
 from modular_framework_benchmark.reports.number_text import (
     NONE,
@@ -201,7 +201,7 @@ def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) 
 def metric_title(metric: Metric) -> str:
     """Returns the name of a metric with unit, clock, source, and an arrow to the better values."""
     arrow = "↑" if metric.better.value == "higher" else "↓"
-    unit = "%" if metric.kind is MetricKind.RATE else metric.unit
+    unit = "%" if metric.is_fraction else metric.unit
     notes = [unit, *([metric.clock.value] if metric.clock else [])]
     notes += [metric.source.value] if metric.source is Source.SAID else []
     noted = ", ".join(filter(None, notes))
@@ -216,7 +216,7 @@ def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
     """Returns an estimate with its interval, without unit; a rate is in percent."""
     if estimate is None:
         return NONE
-    scale, unit = (100.0, "%") if metric.kind is MetricKind.RATE else (1.0, metric.unit)
+    scale, unit = (100.0, "%") if metric.is_fraction else (1.0, metric.unit)
     if estimate.interval is None:
         return number_text(scale * estimate.value, unit=unit)
     return interval_text(scale * estimate.value, scale * estimate.interval.low, scale * estimate.interval.high, unit)
@@ -272,7 +272,8 @@ def method_table(content: ReportContent, component: str) -> Table:
 
 def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
     low, high = item.quartiles or (None, None)
-    ends = [number_text(end, unit=metric.unit) for end in (low, high)]
+    scale, unit = (100.0, "%") if metric.is_fraction else (1.0, metric.unit)
+    ends = [number_text(None if end is None else scale * end, unit=unit) for end in (low, high)]
     texts = (
         estimate_text(item.estimate, metric),
         f"{ends[0]} to {ends[1]}" if item.quartiles else NONE,

@@ -44,7 +44,8 @@ class Settings:
     Attributes:
         confidence: Confidence level of the intervals.
         at_any_time: Whether tests and intervals must be anytime-valid.
-        mean_intervals: Whether the mean differences of bounded metrics get a betting interval.
+        mean_intervals: Whether the mean differences of all bounded metrics get a betting interval, not only those of
+            partial credit.
     """
 
     confidence: float
@@ -151,6 +152,7 @@ def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Esti
     means, _ = unit_means(differences[known], _coarser_units(matched)[known])
     bounds_width = metric.bounds[1] - metric.bounds[0]
     interval = None
-    if settings.mean_intervals and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
+    wanted = settings.mean_intervals or metric.kind is MetricKind.PARTIAL_CREDIT
+    if wanted and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
         interval = sequential.anytime_interval(means, settings.confidence, bounds_width)
     return Estimate("mean difference", float(np.mean(means)), interval)

@@ -4,9 +4,10 @@
 This module defines the value of an episode that failed, timed out, broke or lacks a value:
 
 - Success: every episode that does not succeed is a failure, including broken ones.
-- Other metrics except rates: an unsuccessful episode ranks worse than any value if the metric describes the whole task
-  (outside the mode `task`, for every metric) or if the episode has no value. Its value in a mean is the metric's limit,
-  if there is one. Values beyond the limit also count at the limit.
+- Other metrics except rates and partial credit: an unsuccessful episode ranks worse than any value if the metric
+  describes the whole task (outside the mode `task`, for every metric) or if the episode has no value. Its value in a
+  mean is the metric's limit, if there is one. Values beyond the limit also count at the limit.
+- Partial credit: every episode has its own value; an episode without one, such as a broken episode, counts as 0.
 - Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
   Missing values are excluded from the figures and counted.
 
@@ -255,6 +256,8 @@ class EpisodeTable:
         if metric.name in self.results.episodes:
             values = pd.to_numeric(self.results.episodes[metric.name]).to_numpy(float).copy()
         values[~np.isfinite(values) | self._broken] = np.nan
+        if metric.kind is MetricKind.PARTIAL_CREDIT and not np.isnan(values).all():
+            values = np.clip(np.nan_to_num(values, nan=0.0), 0.0, 1.0)
         scores, failed = values.copy(), self._failed(values, metric)
         scores[failed] = -np.inf if metric.better is Direction.HIGHER else np.inf
         censored = np.zeros(count, dtype=bool)
@@ -265,7 +268,7 @@ class EpisodeTable:
 
     def _failed(self, values: Floats, metric: Metric) -> Flags:
         """Returns whether each episode ranks worse than any value."""
-        if metric.kind is MetricKind.RATE or np.isnan(values).all():  # never reported, such as the hold time
+        if metric.is_fraction or np.isnan(values).all():  # never reported, such as the hold time
             return np.zeros(len(values), dtype=bool)
         whole_episode = metric.component == "task" or self.results.description.mode != "task"
         return np.asarray(~self._succeeded & (whole_episode | np.isnan(values)))

@@ -111,8 +111,8 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     if estimate is None:
         reason = f"none of {count(counts.episodes, 'episode')} has a value" if counts.episodes else "no episodes"
         return f"{method}: no {spaced_name(metric)} ({reason})"
-    scale = 100.0 if metric.kind is MetricKind.RATE else 1.0
-    unit = " %" if metric.kind is MetricKind.RATE else f" {metric.unit}".rstrip()
+    scale = 100.0 if metric.is_fraction else 1.0
+    unit = " %" if metric.is_fraction else f" {metric.unit}".rstrip()
     interval, interval_text = estimate.interval, "no interval"
     digits = _digits(0.0, scale * estimate.value)
     if interval is not None:
@@ -132,7 +132,9 @@ def spaced_name(metric: Metric) -> str:
 
 
 def signed_amount(metric: Metric, value: float) -> str:
-    """Returns a signed difference with its unit: `-0.31 s`."""
+    """Returns a signed difference with its unit: `-0.31 s`, `+12 points`."""
+    if metric.is_fraction:
+        return _points(100.0 * value, max(_digits(0.0, 100.0 * value) - 1, 0))
     text = _number(value, _digits(0.0, value))
     sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
     return f"{sign}{text} {metric.unit}".rstrip()
