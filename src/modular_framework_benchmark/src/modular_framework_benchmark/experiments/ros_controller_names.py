@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the controller types, hardware types and joints in the configuration of a launch."""
+"""Checks the controllers and the hardware in the configuration of a launch: types, joints and parameters."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import rospkg
 
+from modular_framework_control.controller_manager.controller_parameters import parameter_faults
 from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
 from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex
 from modular_framework_core.launching.robot_controllers_spawner import (
@@ -27,12 +28,10 @@ JOINT_KEYS = (
     "rear_steering",
 )  # fmt: skip
 """Keys of a controller that name joints."""
-KEYS_BY_JOINT = ("constraints", "gains", "velocity_ff")
-"""Keys of a controller with a mapping per joint."""
 
 
 def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterator[LaunchFault]:
-    """Yields unreadable controller files, and unknown controller types and joints in them.
+    """Yields unreadable controller files, and unknown controller types, joints and parameters in them.
 
     Args:
         launch: Launch to check.
@@ -62,7 +61,7 @@ def _faults_in(file: ControllerFile, joints: tuple[str, ...]) -> Iterator[str]:
         elif kind in BUILT_IN_TYPES:
             for joint in _unknown_joints(entry, joints):
                 yield f"{where}: the robot has no joint '{joint}'; {listing(joints)}{nearest(joint, joints)}"
-            yield from (f"{where}: {text}" for text in _misplaced_joints(entry))
+        yield from (f"{where}: {text}" for text in parameter_faults(kind, entry))
 
 
 def _names(value: Any) -> list[str]:
@@ -72,16 +71,6 @@ def _names(value: Any) -> list[str]:
 def _unknown_joints(entry: Mapping[str, Any], joints: tuple[str, ...]) -> list[str]:
     named = dict.fromkeys(name for key in JOINT_KEYS for name in _names(entry.get(key)))
     return [name for name in named if joints and name not in joints]
-
-
-def _misplaced_joints(entry: Mapping[str, Any]) -> Iterator[str]:
-    """Yields settings of joints that the controller does not use."""
-    own = [*_names(entry.get("joints")), *_names(entry.get("joint"))]
-    for key in KEYS_BY_JOINT if own else ():
-        below = entry.get(key)
-        for name, value in below.items() if isinstance(below, Mapping) else ():
-            if isinstance(value, Mapping) and name not in own:
-                yield f"{key} names no joint of it: '{name}'; {listing(own)}{nearest(str(name), own)}"
 
 
 def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[LaunchFault]:

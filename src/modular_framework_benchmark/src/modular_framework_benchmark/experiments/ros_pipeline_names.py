@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_core.launching.declared_trees import tree_fault
 from modular_framework_core.launching.ros_declared_names import LaunchFault
 from modular_framework_planning.planning_pipeline.planner_registry import PlannerRegistry, UnknownNameError
 from modular_framework_ros.allowed_names import listing, nearest
+from modular_framework_ros.declared_trees import tree_fault
 from modular_framework_ros.parameter_declarations import existing_declaration
 
 PACKAGE = "modular_framework_planning"

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_manager.controller_parameters import parameter_faults
 from modular_framework_control.controller_manager.controller_statistics import StatisticsSnapshot
 from modular_framework_control.controller_manager.controller_switch import (
     LOGGER,
@@ -29,6 +30,7 @@ from modular_framework_control.hardware_interface.interfaces import ControllerIn
 from modular_framework_control.hardware_interface.joint_limits import missing_limits
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle, join_names
+from modular_framework_ros.parameter_declarations import DeclarationError
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]
@@ -206,6 +208,7 @@ class ControllerManager:
                     f"cannot load controller '{name}': opening its topics and actions raised "
                     f"{type(error).__name__}: {error}"
                 ) from error
+            _warn_of_unread_parameters(info, controller_nh)
             self._detach[name] = lambda: _close(name, controller, detach)
             self._loaded = (*self._loaded, LoadedController(info, controller))
 
@@ -375,3 +378,13 @@ def _close(name: str, controller: Controller, detach: Detach) -> None:
         controller.close()
     except Exception as error:  # a user's controller may raise anything; it is unloaded anyway
         LOGGER.exception("controller '%s': close() raised %s: %s", name, type(error).__name__, error)
+
+
+def _warn_of_unread_parameters(info: ControllerInfo, controller_nh: NodeHandle) -> None:
+    """Logs the parameters that a controller does not read; as in ros_control, the controller runs nevertheless."""
+    try:
+        faults = parameter_faults(info.type, controller_nh.get_param("") or {})
+    except DeclarationError as error:
+        faults = [str(error)]
+    for fault in faults:
+        LOGGER.warning("controller '%s' of type %s: %s; it is ignored", info.name, info.type, fault)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from modular_framework_core.launching.declared_trees import tree_fault
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_ros.allowed_names import closest, nearest
+from modular_framework_ros.declared_trees import tree_fault
 from modular_framework_ros.parameter_declarations import (
     Declaration,
     NodeDeclaration,

@@ -559,7 +559,11 @@ CASES = [
         "did you mean 'position_controllers/JointTrajectoryController'",
     ),
     in_controllers("- elbow_joint", "- elbo_joint", "no joint 'elbo_joint'.*did you mean 'elbow_joint'"),
-    in_controllers("    elbow_joint:", "    elbo_joint:", "constraints names no joint of it: 'elbo_joint'"),
+    in_controllers("    elbow_joint:", "    elbo_joint:", "'constraints/elbo_joint/.*: 'elbo_joint'.*'elbow_joint'"),
+    in_controllers("goal_time:", "goal_tme:", "no joint or parameter: 'goal_tme'.*did you mean 'goal_time'"),
+    in_controllers("stop_trajectory_duration", "stop_trajectory_duratin", "did you mean 'stop_trajectory_duration'"),
+    in_controllers("state_publish_rate", "state_publish_rat", "did you mean 'state_publish_rate'"),
+    in_controllers("state_publish_rate: ", "state_publish_rate: -", "'state_publish_rate' is -.*at least 0"),
     in_controllers("ezgripper_knuckle_palm_L1_1", "ezgripper_knuckle_palm_L1_", "mean 'ezgripper_knuckle_palm_L1_1'"),
     # Task scripts
     in_script(OWN_TASK.format(name="own", option="lambda: 3, "), "key 'lambda' is unknown", OWN_STATE),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from modular_framework_core.launching.declared_trees import tree_fault
+from modular_framework_ros.declared_trees import tree_fault
 from modular_framework_ros.parameter_declarations import NodeDeclaration, read_declaration
 
 DECLARATION = """

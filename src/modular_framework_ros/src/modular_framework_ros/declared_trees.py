@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,30 @@ class _Pattern:
 
     parts: tuple[str, ...]
     declared: Declaration
+
+
+def tree_faults(
+    parameters: Mapping[str, Any], below: NodeDeclaration, robot: Mapping[str, Collection[str]], parent: str = ""
+) -> Iterator[str]:
+    """Yields the error of each unknown name, invalid value and missing required value in nested parameters.
+
+    Args:
+        parameters: Nested parameters.
+        below: Declaration of the names in the tree.
+        robot: Names of the robot by kind, see `tree_fault`.
+        parent: Name of the parent relative to the tree, with a slash at the end; "" at the top level.
+    """
+    for key, value in parameters.items():
+        name = f"{parent}{key}"
+        if isinstance(value, Mapping):
+            yield from tree_faults(value, below, robot, f"{name}/")
+        elif value is not None:
+            fault = tree_fault(name, value, below, robot)
+            yield from [f"parameter '{name}' {fault}"] if fault else []
+    if not parent:
+        for name, item in below.parameters.items():
+            if item.required and parameters.get(name) is None:
+                yield f"parameter '{name}' is not set; {item.needed}"
 
 
 def tree_fault(name: str, value: Any, below: NodeDeclaration, robot: Mapping[str, Collection[str]]) -> str:
@@ -64,11 +88,8 @@ def _matched_length(part: str, remaining_parts: tuple[str, ...], robot: Mapping[
 
 
 def _unknown(part: str, patterns: list[_Pattern], robot: Mapping[str, Collection[str]]) -> str:
-    kinds: list[str] = []
-    names: list[str] = []
-    for first in dict.fromkeys(pattern.parts[0] for pattern in patterns if pattern.parts):
-        kind = first.strip("{}") if first.startswith("{") else ""
-        kinds += [kind] if kind else []
-        names += robot[kind] if kind else [first]
-    kind_text = " or ".join(kinds) if kinds else "parameter"
-    return f"names no {kind_text}: '{part}'; {listing(names, 'there is none')}{nearest(part, names)}"
+    firsts = list(dict.fromkeys(pattern.parts[0] for pattern in patterns if pattern.parts))
+    kinds = [first.strip("{}") for first in firsts if first.startswith("{")]
+    words = [*kinds, *(["parameter"] if len(kinds) < len(firsts) or not firsts else [])]
+    names = [name for first in firsts for name in (robot[first.strip("{}")] if first.startswith("{") else [first])]
+    return f"names no {' or '.join(words)}: '{part}'; {listing(names, 'there is none')}{nearest(part, names)}"
