@@ -305,6 +305,45 @@ def test_a_controller_moves_joints_through_their_transmission(make_loop: Callabl
     assert state.position == pytest.approx(0.25)
 
 
+class LateMotors(Motors):
+    """Motors whose device is silent in the first cycles; each command that is sent to them is kept."""
+
+    SILENT_CYCLES = 5
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        self.transmissions = RobotTransmissions(self, root_nh, self.names)
+        self.device = dict(zip(self.names, (10.0, 20.0), strict=True))
+        self.sent: list[float] = []
+        self.cycles = 0
+        return True
+
+    def read(self, time_s: float, period_s: float) -> None:
+        self.cycles += 1
+        if self.cycles > self.SILENT_CYCLES:
+            for motor in self.transmissions.actuators.values():
+                motor.position = self.device[motor.name]
+        super().read(time_s, period_s)
+
+    def write(self, time_s: float, period_s: float) -> None:
+        self.transmissions.propagate_commands()
+        for motor in self.transmissions.actuators.values():
+            if math.isfinite(motor.command_position):
+                self.sent.append(motor.command_position)
+                self.device[motor.name] = motor.command_position
+
+
+def test_motors_whose_device_answers_late_stay_where_they_stand(make_loop: Callable[..., Any]) -> None:
+    loop = make_loop({"robot_description": robot(pair("FourBarLinkageTransmission"))}, LateMotors())
+    joints = loop.robot_hw.get(JointStateInterface).handles
+    loop.step(LateMotors.SILENT_CYCLES)
+    assert all(math.isnan(joint.position) for joint in joints), "nothing is measured yet"
+    assert loop.robot_hw.sent == []
+    loop.step(20)
+    assert loop.robot_hw.sent, "the joints are held once they are measured"
+    assert loop.robot_hw.sent == pytest.approx([10.0, 20.0] * (len(loop.robot_hw.sent) // 2))
+    assert loop.robot_hw.device == pytest.approx({"m1": 10.0, "m2": 20.0})
+
+
 def test_each_interface_of_a_joint_has_its_command_of_the_actuator() -> None:
     hardware, text = (
         Motors(),

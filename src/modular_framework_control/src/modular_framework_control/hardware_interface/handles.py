@@ -139,7 +139,7 @@ class ActuatorHandle:
 
     Attributes:
         name: Name as in the <transmission> of the robot description.
-        position: Measured position [rad|m].
+        position: Measured position [rad|m]; NaN until measured, and with it the positions of the joints.
         velocity: Measured velocity [rad/s|m/s].
         effort: Measured effort [Nm|N].
         command_position: Commanded position [rad|m].
@@ -151,7 +151,8 @@ class ActuatorHandle:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.position = self.velocity = self.effort = 0.0
+        self.position = math.nan
+        self.velocity = self.effort = 0.0
         self.command_position = self.command_velocity = self.command_effort = math.nan
 
     def __repr__(self) -> str:
