@@ -78,6 +78,10 @@ def test_the_experiments_that_the_cases_change_are_in_order(content: dict, tmp_p
             ("parameters", "/move_group/moveit_controller_manager"),
             "moveit_ros_control_interface::MoveItControllerManager",
         ),
+        # keys of plugins: TRAC-IK, bio_ik and opw
+        (("parameters", "/robot_description_kinematics/arm"), {"solve_type": "Distance", "epsilon": 0.001}),
+        (("parameters", "/robot_description_kinematics/arm"), {"mode": "bio2_memetic", "counter": False, "threads": 2}),
+        (("parameters", "/robot_description_kinematics/arm/opw_kinematics_geometric_parameters"), {"a1": 0.1}),
         (("arguments", "physics_engine"), "mujoco"),
         (("arguments", "planner_name"), "PRM"),
     ],

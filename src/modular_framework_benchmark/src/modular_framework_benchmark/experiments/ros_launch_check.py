@@ -30,7 +30,7 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     ResolvedPlanner,
     UnknownNameError,
 )
-from modular_framework_ros.allowed_names import listing, nearest
+from modular_framework_ros.allowed_names import closest, listing, nearest
 
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"
@@ -146,8 +146,8 @@ class LaunchCheck:
                 continue
             if groups and group not in groups:
                 yield unknown_name(name, "planning group", group, groups)
-            elif key.startswith("kinematics_") and key not in KEYS:
-                yield unknown_name(name, "key of kinematics.yaml", key, KEYS)
+            elif key not in KEYS and (key.startswith("kinematics_") or closest(key, KEYS)):
+                yield unknown_name(name, "key of kinematics.yaml", key, KEYS)  # plugins have further keys
             elif key == "kinematics_solver" and not is_known_solver(str(value)):
                 yield unknown_name(name, key, str(value), (NUMERIC, *PLUGINS))
 

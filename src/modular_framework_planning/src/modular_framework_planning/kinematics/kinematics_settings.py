@@ -32,6 +32,7 @@ KEYS = (
     "kinematics_solver_timeout",
     "kinematics_solver_attempts",
     "kinematics_solver_ik_links",
+    "position_only_ik",
 )
 _PLUGIN = re.compile(r"\w+/\w+")
 
