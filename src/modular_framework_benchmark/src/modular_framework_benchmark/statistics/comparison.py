@@ -45,11 +45,14 @@ class Estimate:
         name: Estimand: `rate`, `median`, `mean`, `restricted mean` or `win difference`.
         value: Estimate in the metric's unit; a rate is from 0 to 1, a median that is a failure is infinite.
         interval: Confidence interval, or None if none can be computed.
+        needed_episodes: Number of episodes with which an interval is expected; None if the number is unknown or the
+            estimate has an interval.
     """
 
     name: str
     value: float
     interval: Interval | None
+    needed_episodes: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

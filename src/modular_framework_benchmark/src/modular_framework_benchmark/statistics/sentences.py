@@ -114,6 +114,8 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     scale = 100.0 if metric.is_fraction else 1.0
     unit = " %" if metric.is_fraction else f" {metric.unit}".rstrip()
     interval, interval_text = estimate.interval, "no interval"
+    if estimate.needed_episodes is not None:
+        interval_text += f", which would need about {estimate.needed_episodes} episodes"
     digits = _digits(0.0, scale * estimate.value)
     if interval is not None:
         digits = _digits(scale * interval.low, scale * interval.high)

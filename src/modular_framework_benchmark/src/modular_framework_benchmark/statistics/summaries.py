@@ -15,6 +15,7 @@ from modular_framework_benchmark.statistics.rates import rate_interval
 from modular_framework_benchmark.statistics.values import (
     MIN_UNITS,
     bounded_mean_interval,
+    episodes_for_restricted_mean,
     median_interval,
     restricted_mean_interval,
 )
@@ -77,7 +78,8 @@ def _mean(observed: Observations, metric: Metric, confidence: float) -> Estimate
     if metric.limit is not None:
         limits = (metric.limit, low if metric.better is Direction.LOWER else high)
         interval = restricted_mean_interval(observed.values, observed.censored, limits, confidence) if single else None
-        return Estimate("restricted mean", mean, interval)
+        needed = episodes_for_restricted_mean(observed.censored) if single and interval is None else None
+        return Estimate("restricted mean", mean, interval, needed)
     within_bounds = low <= observed.values.min() and observed.values.max() <= high
     bounded = math.isfinite(low) and math.isfinite(high) and within_bounds
     return Estimate("mean", mean, bounded_mean_interval(means, (low, high), confidence) if bounded else None)

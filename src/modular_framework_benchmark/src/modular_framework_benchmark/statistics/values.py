@@ -122,6 +122,19 @@ def restricted_mean_interval(
     return Interval(min(means), max(means), confidence, "Clopper-Pearson of failures, Student's t")
 
 
+def episodes_for_restricted_mean(failed: NDArray[np.bool_]) -> int | None:
+    """Returns the number of episodes that yields enough successes for an interval of a restricted mean.
+
+    Assumes that the fraction of failures stays as observed. Returns None without a success, and with enough successes,
+    whose equal values then are the reason for the missing interval.
+
+    Args:
+        failed: Whether each episode counts at the limit, shape (n,).
+    """
+    successes = len(failed) - int(failed.sum())
+    return math.ceil(MIN_UNITS * len(failed) / successes) if 0 < successes < MIN_UNITS else None
+
+
 @lru_cache(maxsize=4096)
 def _median_rank(count: int, confidence: float) -> int:
     """Returns the zero-based rank of the value at the lower end of the interval of a median."""
