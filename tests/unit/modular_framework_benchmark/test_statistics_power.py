@@ -114,11 +114,28 @@ def test_the_correction_keeps_the_error_rate_of_identical_methods_with_few_decid
     assert 0 < false <= 130
 
 
-def planned(methods: int, trials: int, problems: int = 0) -> str:
+@pytest.mark.parametrize(("pairs", "difference", "differing"), [(14, 0.8, 0.9), (30, 0.5, 0.7)])
+def test_the_power_of_a_sequential_rule_is_at_least_the_share_of_outcomes_that_show_the_difference_at_its_end(
+    pairs: int, difference: float, differing: float
+) -> None:
+    shares = [(differing + difference) / 2, (differing - difference) / 2, 1 - differing]
+    counted = sum(
+        stats.multinomial.pmf([one, other, pairs - one - other], pairs, shares)
+        for one in range(pairs + 1)
+        for other in range(min(one, pairs + 1 - one))
+        if anytime_p_value(np.repeat([1.0, -1.0, 0.0], [one, other, pairs - one - other])) <= 0.05
+    )
+    power = rate_power(pairs, difference, differing, at_any_time=True)
+    assert power == pytest.approx(counted, abs=1e-9)
+    assert power < rate_power(pairs, difference, differing), "looks cost power"
+
+
+def planned(methods: int, trials: int, problems: int = 0, sequential: bool = False) -> str:
     names = tuple("abcdefgh"[:methods])
     description = replace(
         results_of({name: [] for name in names}, (TIME,), {"task_time": {name: [] for name in names}}).description,
         mode="planning" if problems else "task",
+        sequential=sequential,
     )
     episodes = [
         EpisodeSpec(
@@ -143,6 +160,17 @@ def test_the_dry_run_names_the_smallest_difference_and_what_others_need() -> Non
     assert f"success: from {100 * (detectable_difference(100, 0.025, 0.3) or 0):g} points" in text
     assert f"{pairs_for_rate(0.05, 0.3, 0.025):,}, {pairs_for_rate(0.1, 0.3, 0.025)} and" in text
     assert "60, 70 and 80 % of the pairs won need" in text
+
+
+def test_the_dry_run_of_a_sequential_experiment_names_the_smallest_difference_and_what_others_need() -> None:
+    text = planned(2, 100, sequential=True)
+    assert f"after {min_units(0.025, at_any_time=True)} scenes at the earliest" in text
+    smallest, needed = detectable_difference(100, 0.025, 0.3, True), pairs_for_rate(0.2, 0.3, 0.025, at_any_time=True)
+    assert smallest is not None and needed is not None
+    assert f"success: from {100 * smallest:g} points" in text and f"and {needed:,} scenes" in text
+    assert "other metrics: from" in text
+    assert smallest > (detectable_difference(100, 0.025, 0.3) or 1.0)
+    assert needed > (pairs_for_rate(0.2, 0.3, 0.025) or 0)
 
 
 def test_the_dry_run_counts_repeated_problems_as_one_unit() -> None:

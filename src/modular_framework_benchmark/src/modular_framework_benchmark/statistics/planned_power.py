@@ -37,25 +37,30 @@ def power_text(description: ExperimentDescription, episodes: Sequence[EpisodeSpe
     ]
     if description.sequential:
         minimum = min_units(error_rate / max(pairs, 1), at_any_time=True)
-        return f"{lines[0]}\n    sequential rule: a difference in success after {minimum} {nouns} at the earliest"
+        lines.append(f"    sequential rule: a difference in success after {minimum} {nouns} at the earliest")
     for name, comparisons, discordance in (
         ("success", pairs, DISCORDANCE),
         ("other metrics", pairs * others, 1.0),
     ):
         if comparisons:
-            found = _line(table.unit_count, nouns, error_rate / comparisons, discordance)
+            found = _line(table.unit_count, nouns, error_rate / comparisons, discordance, description.sequential)
             lines.append(f"    {name}: {found}")
     return "\n".join(lines)
 
 
-def _line(units: int, nouns: str, error_rate: float, discordance: float) -> str:
+def _line(units: int, nouns: str, error_rate: float, discordance: float, at_any_time: bool) -> str:
     """Returns the detectable differences of success, whose pairs are partly discordant, or of other metrics."""
     of_success = discordance < 1.0
     differences = PRINTED_RATES if of_success else PRINTED_WINS
-    needed = [pairs_for_rate(difference, discordance, error_rate) for difference in differences]
+    needed = [
+        pairs_for_rate(difference, discordance, error_rate, at_any_time=at_any_time) for difference in differences
+    ]
     counts = sentences.enumeration([f"{count:,}" if count else "over a million" for count in needed])
     needed_text = f"{_difference_text(differences, of_success)} need {counts} {nouns}"
-    smallest, minimum = detectable_difference(units, error_rate, discordance), min_units(error_rate)
+    smallest, minimum = (
+        detectable_difference(units, error_rate, discordance, at_any_time),
+        min_units(error_rate, at_any_time),
+    )
     if units < minimum:
         return f"no difference, since at least {minimum} {nouns} would have to be won; {needed_text}"
     shown = "none is likely to be shown" if smallest is None else f"from {_difference_text([smallest], of_success)}"

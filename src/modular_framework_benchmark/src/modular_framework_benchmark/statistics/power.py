@@ -7,10 +7,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval
-from modular_framework_benchmark.statistics.sequential import anytime_p_value
+from modular_framework_benchmark.statistics.sequential import anytime_p_value, log_capital
 from modular_framework_benchmark.statistics.values import MIN_UNITS
 
 POWER = 0.8
@@ -19,29 +20,52 @@ MAX_PAIRS = 1_000_000
 
 
 @lru_cache(maxsize=4096)
-def rate_power(pairs: int, difference: float, discordance: float, error_rate: float = 0.05) -> float:
-    """Returns the power of McNemar's exact test for a win difference, which for a rate is the difference of the rates.
+def rate_power(
+    pairs: int, difference: float, discordance: float, error_rate: float = 0.05, at_any_time: bool = False
+) -> float:
+    """Returns the power for a win difference, which for a rate is the difference of the rates.
 
-    The sum over the number of discordant pairs and of pairs won by the first method is exact.
+    The sum over the number of discordant pairs and of pairs won by the first method is exact. The test is McNemar's, or
+    the anytime-valid test after the last pair; the latter may end sooner, so its power is a lower bound.
 
     Args:
         pairs: Number of paired episodes.
         difference: Win difference, such as 0.05 for 5 points.
         discordance: Fraction of discordant pairs; at least the absolute difference.
         error_rate: Two-sided error rate of the comparison after the multiplicity correction.
+        at_any_time: Whether the test is anytime-valid.
     """
     discordance = min(max(discordance, abs(difference)), 1.0)
     fewest, most = stats.binom.ppf([1e-12, 1 - 1e-12], pairs, discordance)
     discordant = np.arange(int(fewest), int(most) + 1)
     probabilities = stats.binom.pmf(discordant, pairs, discordance)
-    # Number of wins that the test needs; a two-sided test has half of the error rate in each tail.
-    min_wins = stats.binom.isf(error_rate / 2, discordant, 0.5) + 1
+    min_wins = _sequential_wins(discordant, error_rate) if at_any_time else _fixed_wins(discordant, error_rate)
     win_probability = (1 + abs(difference) / discordance) / 2 if discordance else 0.5
     return float(np.sum(probabilities * stats.binom.sf(min_wins - 1, discordant, win_probability)))
 
 
+def _fixed_wins(discordant: NDArray[np.int64], error_rate: float) -> NDArray[np.float64]:
+    """Returns the wins that McNemar's test needs for each number of discordant pairs (two-sided)."""
+    return np.asarray(stats.binom.isf(error_rate / 2, discordant, 0.5) + 1)
+
+
+def _sequential_wins(discordant: NDArray[np.int64], error_rate: float) -> NDArray[np.float64]:
+    """Returns the wins that the anytime-valid test needs for each number of discordant pairs, found by bisection."""
+    differences, threshold = np.array([-1.0, 1.0]), -math.log(error_rate)
+    low, high = discordant // 2, discordant + 1  # more wins than pairs: no number of wins is enough
+    while np.any(high - low > 1):
+        middle = (low + high) // 2
+        is_enough = (
+            log_capital(differences, np.stack([discordant - middle, middle], axis=-1).astype(float)) >= threshold
+        )
+        low, high = np.where(is_enough, low, middle), np.where(is_enough, middle, high)
+    return high.astype(float)
+
+
 @lru_cache(maxsize=1024)
-def pairs_for_rate(difference: float, discordance: float, error_rate: float = 0.05, power: float = POWER) -> int | None:
+def pairs_for_rate(
+    difference: float, discordance: float, error_rate: float = 0.05, power: float = POWER, at_any_time: bool = False
+) -> int | None:
     """Returns the number of paired episodes that shows a difference of rates, or None above a million.
 
     The search starts from the asymptotic formula. Source of the formula: R. J. Connor, Sample
@@ -52,6 +76,7 @@ def pairs_for_rate(difference: float, discordance: float, error_rate: float = 0.
         discordance: Fraction of discordant pairs.
         error_rate: Two-sided error rate of the comparison after the multiplicity correction.
         power: Required power.
+        at_any_time: Whether the test is anytime-valid.
     """
     discordance = min(max(discordance, difference), 1.0)
     spread = stats.norm.isf(error_rate / 2) * math.sqrt(discordance)
@@ -60,27 +85,32 @@ def pairs_for_rate(difference: float, discordance: float, error_rate: float = 0.
     if low > MAX_PAIRS:
         return None
     high = max(low, 1)
-    while rate_power(high, difference, discordance, error_rate) < power:
+    while rate_power(high, difference, discordance, error_rate, at_any_time) < power:
         low, high = high, math.ceil(high * 1.1) + 1
-    while rate_power(max(low, 1), difference, discordance, error_rate) >= power and low > 1:
+    while rate_power(max(low, 1), difference, discordance, error_rate, at_any_time) >= power and low > 1:
         low = int(low / 1.1)
     while high - low > 1:
         middle = (low + high) // 2
-        enough = rate_power(middle, difference, discordance, error_rate) >= power
+        enough = rate_power(middle, difference, discordance, error_rate, at_any_time) >= power
         low, high = (low, middle) if enough else (middle, high)
     return high
 
 
-def detectable_difference(units: int, error_rate: float, discordance: float = 1.0) -> float | None:
+def detectable_difference(
+    units: int, error_rate: float, discordance: float = 1.0, at_any_time: bool = False
+) -> float | None:
     """Returns the smallest win difference that the units show with 80 % power, or None if no difference is shown.
 
     Args:
         units: Number of independent pairs.
         error_rate: Two-sided error rate of the comparison after the multiplicity correction.
         discordance: Fraction of discordant pairs, raised to the difference if smaller.
+        at_any_time: Whether the test is anytime-valid.
     """
+    if units < min_units(error_rate, at_any_time):
+        return None
     for points in range(1, 101):
-        if rate_power(units, points / 100, discordance, error_rate) >= POWER and units >= min_units(error_rate):
+        if rate_power(units, points / 100, discordance, error_rate, at_any_time) >= POWER:
             return points / 100
     return None
 
