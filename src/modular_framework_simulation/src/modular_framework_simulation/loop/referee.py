@@ -64,7 +64,7 @@ class Referee:
 
     @property
     def interventions(self) -> tuple[Intervention, ...]:
-        """Returns the latest interventions, at most KEPT_INTERVENTIONS."""
+        """Returns the latest interventions, at most MAX_INTERVENTIONS."""
         with self._lock:
             return tuple(self._interventions)
 
