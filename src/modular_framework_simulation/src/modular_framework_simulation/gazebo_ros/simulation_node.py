@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 import sys
 import threading
 from collections.abc import Mapping
@@ -23,6 +22,7 @@ from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
+from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
 from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, noise_seed
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
@@ -38,11 +38,9 @@ from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
-from modular_framework_simulation.models.package_exports import MEDIA_EXPORT, MODEL_EXPORT, exported_folders
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_world
-from modular_framework_simulation.models.sdf_resources import RESOURCE_PATH, Resources, folders_of, model_folders
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
@@ -69,18 +67,6 @@ def _pacer(parameters: Mapping[str, Any], requests: RequestQueue) -> Pacer:
     return Pacer(parameters["~real_time_factor"], sleep=requests.serve, idle_limit=idle_limit)
 
 
-def _resources(model_path: str) -> Resources:
-    """Returns the search paths of models: the parameter, Gazebo's environment variables, and exports of packages."""
-    ros_packages = rospkg.RosPack()
-    packages = [Path(ros_packages.get_path(name)) for name in ros_packages.list()]
-    first = [Path(entry) for entry in model_path.split(os.pathsep) if entry]
-    return Resources(
-        (*model_folders(first, os.environ), *exported_folders(packages, MODEL_EXPORT)),
-        ros_packages.get_path,
-        (*folders_of(os.environ, RESOURCE_PATH), *exported_folders(packages, MEDIA_EXPORT)),
-    )
-
-
 class SimulationNode:
     """Builds the world from parameters and runs it.
 
@@ -98,7 +84,7 @@ class SimulationNode:
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
-        self._resources = _resources(parameters["/gazebo_model_path"])
+        self._resources = ros_resources(parameters["/gazebo_model_path"])
         self._settings = PhysicsSettings(round(parameters["~time_step"] * 1e9))
         self._parts = ConvexParts(default_cache_folder(), rospy.loginfo)
         self._world = self._build_world(parameters)

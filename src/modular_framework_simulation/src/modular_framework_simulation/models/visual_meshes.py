@@ -91,7 +91,7 @@ class VisualMeshes:
         key = hashlib.sha256(f"{_CACHE_VERSION}|{visual.geometry}|{visual.colour}|{visual.own_materials}".encode())
         files = [visual.texture] if visual.texture is not None else []
         if isinstance(visual.geometry, Mesh):
-            files += [visual.geometry.path, *_referenced_files(visual.geometry.path)]
+            files += [visual.geometry.path, *referenced_files(visual.geometry.path)]
         for file in files:
             try:
                 key.update(file.read_bytes())
@@ -100,7 +100,7 @@ class VisualMeshes:
         return key.hexdigest()[:24]
 
 
-def _referenced_files(mesh: Path) -> list[Path]:
+def referenced_files(mesh: Path) -> list[Path]:
     """Returns the existing files that the text of a mesh refers to."""
     if mesh.suffix.lower() not in (".dae", ".obj"):
         return []
