@@ -73,7 +73,7 @@ def test_a_planned_motion_joins_start_and_goal_and_is_measured(
     assert 0.0 < record.metrics["planning_time"] <= record.wall_s
     (planner,) = record.snapshot["planners"]
     assert planner == "RRTConnect of ompl" and set(record.snapshot["digests"]) == {
-        "robot description", "semantic description"
+        "robot description", "semantic description", "robot meshes"
     }  # fmt: skip
 
 

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from typing import Any
 import pytest
 
 from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.ros_file_digests import robot_digests
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
@@ -33,9 +36,13 @@ def plan(planner: str, implementation: str, replaced: str = "") -> dict[str, Any
 
 def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
     (tmp_path / "table.world").write_text("<sdf/>")
+    (tmp_path / "task.yaml").write_text("name: pick")
     parameters = {
         "robot_description": "<robot/>",
         "gazebo": {"world_file": str(tmp_path / "table.world"), "physics_engine": "mujoco"},
+        "gazebo_cameras": {"renderer": "tiny"},
+        "task": {"task_constructor_script": str(tmp_path / "task.yaml")},
+        "arm": {"gains": {"p": 1.0}},
     }
     ran = running_stack(parameters, {"arm": "position_controllers/JointTrajectoryController"}, [], plans)
     return dict(json.loads(json.dumps(asdict(ran))))  # as it comes from the other process
@@ -55,10 +62,53 @@ def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Pat
     }
     assert snapshot["physics_engine"] == "mujoco"
     assert snapshot["controllers"] == {"arm": "position_controllers/JointTrajectoryController"}
-    assert set(snapshot["digests"]) == {"robot description", "world"}
-    (tmp_path / "table.world").write_text("<sdf version='1.7'/>")
-    parameters = {"gazebo": {"world_file": str(tmp_path / "table.world")}}
-    assert running_stack(parameters, {}, [], []).digests["world"] != snapshot["digests"]["world"]
+    assert snapshot["renderer"] == "tiny"
+    assert set(snapshot["digests"]) == {"robot description", "world", "task", "controllers"}
+    assert snapshot["digests"]["task"] == hashlib.sha256(b"name: pick").hexdigest()
+
+
+MESH = "<visual name='v'><geometry><mesh{}</mesh></geometry></visual>"
+
+
+def test_the_digests_of_world_robot_and_objects_cover_the_files_that_they_name(tmp_path: Path) -> None:
+    files = {
+        "table.world": "<sdf version='1.6'><world name='w'><include><uri>model://shelf</uri></include></world></sdf>",
+        "models/shelf/model.sdf": f"<sdf version='1.6'><model name='m'>{MESH.format('><uri>model://shelf/a.stl</uri>')}"
+        "</model></sdf>",
+        "models/shelf/a.stl": "1",
+        "models/can/model.sdf": f"<sdf version='1.6'><model name='m'>{MESH.format('><uri>model://can/b.stl</uri>')}"
+        "</model></sdf>",
+        "models/can/b.stl": "1",
+        "arm.stl": "1",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+
+    robot_mesh = MESH.format(f" filename='file://{tmp_path}/arm.stl'>")
+
+    def digests(parameter: float = 1.0) -> Mapping[str, str]:
+        robot_digests.cache_clear()  # as in another process
+        parameters = {
+            "robot_description": f"<robot>{robot_mesh}</robot>",
+            "gazebo_model_path": str(tmp_path / "models"),
+            "gazebo": {"world_file": str(tmp_path / "table.world")},
+            "arm": {"gains": {"p": parameter}},
+        }
+        return running_stack(parameters, {"arm": "a/B"}, [], [], ["can"]).digests
+
+    before = digests()
+    assert digests() == before
+    assert {name for name, digest in digests(2.0).items() if digest != before[name]} == {"controllers"}
+    for file, name in {
+        "models/shelf/a.stl": "world",
+        "models/can/b.stl": "object can/model.sdf",
+        "arm.stl": "robot meshes",
+    }.items():
+        (tmp_path / file).write_text("22")
+        after = digests()
+        assert {each for each, digest in after.items() if digest != before[each]} == {name}
+        before = after
 
 
 def test_a_record_says_by_which_method_poses_were_solved_and_for_which_plugin(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ import rospkg
 from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.errors import VideoError
+from modular_framework_benchmark.episodes.ros_file_digests import model_file
 from modular_framework_benchmark.metrics.measurements import ObjectTrack
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, objects_of, read_joints, read_recording
 from modular_framework_simulation.errors import SimulationError
@@ -75,7 +76,7 @@ class RecordedScene:
         simulation = parameters.get("gazebo", {})
         self._build_world(str(simulation.get("world_file", "")))
         for name, model in recording.get("spawned", {}).items():
-            file = Path(model) if Path(model).is_absolute() else Path(models) / model / "model.sdf"
+            file = model_file(model, models)
             text = file.read_text()
             self._spawn(replace(read_model_text(text, str(file), self._resources), name=name))
         description = read_robot(

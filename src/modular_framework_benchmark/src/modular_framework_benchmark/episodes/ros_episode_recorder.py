@@ -144,7 +144,8 @@ class EpisodeRecorder:
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]
-        answer["ran"] = asdict(running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans))
+        models = [placed.model for placed in request.objects]
+        answer["ran"] = asdict(running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans, models))
         self._store_part_end(request, answer, "recorded")
         return answer
 

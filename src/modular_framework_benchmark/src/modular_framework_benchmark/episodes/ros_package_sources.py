@@ -11,6 +11,8 @@ from pathlib import Path
 
 import rospkg
 
+from modular_framework_benchmark.episodes.ros_file_digests import file_digest
+
 EXCLUDED_NAMES = {".git", "__pycache__", ".pytest_cache", ".mypy_cache", "tests"}
 
 
@@ -42,12 +44,13 @@ def tree_digest(folders: list[Path]) -> str:
     """Returns the SHA-256 of the files in folders, keyed by relative path; caches and tests are excluded."""
     digest = hashlib.sha256()
     for folder in dict.fromkeys(folders):
-        for path in sorted(_files(folder)):
-            digest.update(f"{path.relative_to(folder)}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+        for path in sorted(tree_files(folder)):
+            digest.update(f"{path.relative_to(folder)}\0{file_digest(path)}\n".encode())
     return digest.hexdigest()
 
 
-def _files(folder: Path) -> Iterator[Path]:
+def tree_files(folder: Path) -> Iterator[Path]:
+    """Yields the files in a folder and its subfolders, without caches and tests."""
     for path in folder.rglob("*"):
         if path.is_file() and not EXCLUDED_NAMES.intersection(path.relative_to(folder).parts) and path.suffix != ".pyc":
             yield path

@@ -4,17 +4,27 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.episodes.ros_file_digests import (
+    file_digest,
+    files_with_named,
+    joint_digest,
+    model_file,
+    model_resources,
+    portable_name,
+    robot_digests,
+    world_files,
+)
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
 from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
-    description_digests,
     named_solvers,
     solver_substitutions,
 )
@@ -22,13 +32,13 @@ from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
 FILE_PARAMETERS = {
-    "world": "/gazebo/world_file",
     "task": "/task/task_constructor_script",
     "state machine": "/task/state_machine_to_load",
 }
 """Parameters of nodes that name files, keyed by kind of file."""
 NODE_TIMEOUT_S = 5.0
 KINEMATICS = "/robot_description_kinematics"
+WORLD, MODEL_PATH = "/gazebo/world_file", "/gazebo_model_path"
 DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
 
 
@@ -37,6 +47,7 @@ def running_stack(
     controllers: Mapping[str, str],
     generators: Iterable[str],
     plans: Iterable[Mapping[str, Any]],
+    models: Iterable[str] = (),
 ) -> UsedSoftware:
     """Returns the software of a stack, including the planners that ran.
 
@@ -45,22 +56,39 @@ def running_stack(
         controllers: Types of the running controllers, keyed by name.
         generators: Names of the nodes that generate grasps.
         plans: Planning reports of move_group.
+        models: Models of the placed objects: names, or absolute paths of their files.
     """
-    files = {what: Path(str(_value(parameters, name))) for what, name in FILE_PARAMETERS.items()}
-    described = description_digests(*(str(_value(parameters, name)) for name in DESCRIPTIONS))
-    digests = {what: hashlib.sha256(path.read_bytes()).hexdigest() for what, path in files.items() if path.is_file()}
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
     software = UsedSoftware(
         methods={name: UsedMethod(version, digest) for name, (version, digest) in methods.items()},
         controllers=dict(controllers),
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
-        digests=described | digests,
+        digests=_digests(parameters, controllers, models),
         substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS))),
     )
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
     return software.with_plans(PlannerRun(**run) for run in runs)
+
+
+def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: Iterable[str]) -> dict[str, str]:
+    """Returns the SHA-256 of what determines the episodes of a stack, keyed by description."""
+    urdf, srdf = (str(_value(parameters, name)) for name in DESCRIPTIONS)
+    named = {what: Path(str(_value(parameters, name))) for what, name in FILE_PARAMETERS.items()}
+    digests = {what: file_digest(path) for what, path in named.items() if path.is_file()}
+    folder = str(_value(parameters, MODEL_PATH))
+    resources = model_resources(folder)
+    files = {"world": world_files(str(_value(parameters, WORLD)), resources)}
+    for model in models:
+        path = model_file(model, folder)
+        if path.is_file():
+            files[f"object {portable_name(path)}"] = files_with_named(path, resources)
+    settings = {name: _value(parameters, name) for name in sorted(controllers)}
+    if settings:
+        digests["controllers"] = hashlib.sha256(json.dumps(settings, sort_keys=True, default=str).encode()).hexdigest()
+    joint = {what: joint_digest(paths) for what, paths in files.items() if paths}
+    return {**robot_digests(urdf, srdf), **joint, **digests}
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import rosgraph
@@ -15,6 +14,7 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
+from modular_framework_benchmark.episodes.ros_file_digests import model_file
 from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
@@ -138,9 +138,7 @@ def _ask_simulation(service: str, kind: Any, request: Any, timeout_s: float) -> 
 
 
 def _description(model: str) -> str:
-    path = Path(model)
-    if not path.is_absolute():
-        path = Path(str(rospy.get_param("/gazebo_model_path"))) / model / "model.sdf"
+    path = model_file(model, str(rospy.get_param("/gazebo_model_path", "")))
     try:
         return path.read_text()
     except OSError as error:

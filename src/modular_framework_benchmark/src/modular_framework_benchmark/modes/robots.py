@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.modes.errors import ModeError
@@ -23,6 +24,7 @@ class Robot:
         planning: `robot_description_planning`: limits and default scaling factors.
         pipelines: Parameters of the planning pipelines, keyed by name.
         urdf: Robot description (URDF text).
+        mesh_folder: Folder of the meshes of packages that do not exist; None for no such meshes.
     """
 
     model: RobotModel
@@ -30,6 +32,7 @@ class Robot:
     planning: Mapping[str, Any] = field(default_factory=dict)
     pipelines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     urdf: str = ""
+    mesh_folder: Path | None = None
 
     def solvers(self) -> KinematicsPool:
         """Returns the inverse kinematics solvers of the groups."""

@@ -25,11 +25,11 @@ from modular_framework_benchmark.modes.method_parameters import GivenParameters
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
+from modular_framework_benchmark.modes.ros_robots import digests_of
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
-    description_digests,
     solver_substitutions,
 )
 from modular_framework_core.grasp_generation.grasp_candidates import (
@@ -109,7 +109,7 @@ def _ran(package: str, prepared: _Prepared) -> UsedSoftware:
         methods={package: UsedMethod(version, sources)},
         solver=prepared.solver.method,
         substitutions=solver_substitutions([prepared.solver.settings.solver]),
-        digests=description_digests(*prepared.robot.model.source[:2]),
+        digests=digests_of(prepared.robot),
     )
 
 

@@ -23,8 +23,9 @@ from modular_framework_benchmark.modes.measured_record import Stopwatch, measure
 from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
+from modular_framework_benchmark.modes.ros_robots import digests_of
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.used_software import UsedSoftware, description_digests, solver_substitutions
+from modular_framework_benchmark.records.used_software import UsedSoftware, solver_substitutions
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.kinematics_settings import (
@@ -86,7 +87,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
             figures=_figures(results),
             ran=UsedSoftware(
                 solver=solver.method,
-                digests=description_digests(*robot.model.source[:2]),
+                digests=digests_of(robot),
                 substitutions=solver_substitutions([solver.settings.solver]),
             ),
         )

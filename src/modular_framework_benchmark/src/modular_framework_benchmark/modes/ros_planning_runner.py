@@ -22,8 +22,9 @@ from modular_framework_benchmark.modes.parameters import merged
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
+from modular_framework_benchmark.modes.ros_robots import digests_of
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.used_software import UsedSoftware, description_digests
+from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
@@ -87,7 +88,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
             figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
             | (_figures(problem, response, settings) if response is not None else {}),
             motion=_motion(response.trajectory) if response is not None else None,
-            ran=_ran(statistics, prepared.model),
+            ran=_ran(statistics, self.robot(settings.robot)),
         )
         return measured_record(spec, _status(code), code.name, report=report, folder=folder, watch=watch)
 
@@ -156,9 +157,9 @@ def _read_problem(settings: PlanningSettings, model: RobotModel) -> MotionProble
     return MotionProblem(named.name, request)
 
 
-def _ran(statistics: PlanStatistics | None, model: RobotModel) -> UsedSoftware:
+def _ran(statistics: PlanStatistics | None, robot: Robot) -> UsedSoftware:
     run = None if statistics is None else statistics.run
-    return UsedSoftware(digests=description_digests(*model.source[:2])).with_plans([] if run is None else [run])
+    return UsedSoftware(digests=digests_of(robot)).with_plans([] if run is None else [run])
 
 
 def _status(code: ErrorCode) -> EpisodeStatus:

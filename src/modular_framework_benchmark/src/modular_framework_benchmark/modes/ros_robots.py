@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.episodes.ros_file_digests import robot_digests
 from modular_framework_benchmark.experiments.robot_setting import RobotFiles, RobotSource
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
@@ -47,10 +48,20 @@ def load_robot(robot: RobotSource) -> Robot:
         raise ModeError(f"robot {as_json(robot)}: {error}") from error
 
 
+def digests_of(robot: Robot) -> Mapping[str, str]:
+    """Returns the SHA-256 of a robot's descriptions and meshes, keyed by description."""
+    urdf, srdf, *_ = robot.model.source
+    return robot_digests(urdf, srdf, robot.mesh_folder)
+
+
 def _from_files(files: RobotFiles) -> Robot:
     urdf = Path(files.urdf)
     text = urdf.read_text()
-    return Robot(RobotModel(text, Path(files.srdf).read_text(), {}, _MeshesBeside(urdf.parent)), urdf=text)
+    return Robot(
+        RobotModel(text, Path(files.srdf).read_text(), {}, _MeshesBeside(urdf.parent)),
+        urdf=text,
+        mesh_folder=urdf.parent,
+    )
 
 
 def _from_package(package: str) -> Robot:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -54,7 +53,8 @@ class UsedSoftware:
         controllers: Types of the running controllers, keyed by name.
         physics_engine: Physics engine of the simulation.
         renderer: Renderer of the cameras; empty without cameras.
-        digests: SHA-256 of the robot description, the world and the task, keyed by description.
+        digests: SHA-256 of the robot's descriptions and meshes, of the world and the objects with the files that they
+            name, of the task, and of the controllers' parameters, keyed by description.
         substitutions: Documented substitutions of named software: CBiRRT for constrained plans.
         replaced: Named software that was missing, with its replacement, which makes the episode invalid.
     """
@@ -139,9 +139,3 @@ def solver_substitutions(named: Iterable[str]) -> tuple[str, ...]:
     """Returns the substitutions of the solvers that kinematics.yaml names, as records and dry runs show them."""
     plugins = sorted(set(named) - {"", NUMERIC, CLOSED_FORM})
     return tuple(f"the framework's inverse kinematics for {plugin}" for plugin in plugins)
-
-
-def description_digests(urdf: str, srdf: str) -> dict[str, str]:
-    """Returns the SHA-256 of a robot's descriptions in hexadecimal, keyed by description; empty texts are skipped."""
-    texts = {"robot description": urdf, "semantic description": srdf}
-    return {what: hashlib.sha256(text.encode()).hexdigest() for what, text in texts.items() if text}
