@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sample_experiment import sample_description, sample_episodes
+from sample_experiment import sample_description, sample_episodes, sample_record
 
+from modular_framework_benchmark.episodes.ros_file_digests import model_resources, robot_files
 from modular_framework_benchmark.episodes.ros_stack_launch import loaded_stack
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
-from modular_framework_benchmark.modes.ros_run_digests import run_digests
+from modular_framework_benchmark.modes.ros_run_digests import _files_in, _packages, run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import OwnMetric, PlacedObject
+from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.results.errors import ExperimentChangedError
 
@@ -21,31 +25,72 @@ LAUNCH = """<launch>
   <arg name="planner_configuration"/>
   <rosparam command="load" ns="move_group" file="$(arg planner_configuration)"/>
   <param name="world_file" value="{world}"/>
+  <param name="gazebo_model_path" value="{folder}/models"/>
+  <param name="robot_description" value="&lt;robot name='r'&gt;&lt;link name='l'&gt;&lt;visual&gt;&lt;geometry&gt;
+    &lt;mesh filename='package://my_robot/meshes/arm.stl'/&gt;&lt;/geometry&gt;&lt;/visual&gt;&lt;/link&gt;&lt;/robot&gt;"/>
   <node pkg="top_down_grasps" type="top_down_grasp_generator" name="method" args="{poses}"/>
+  <node pkg="modular_framework_core" type="robot_controllers_spawner" name="spawner" args="my_robot arm.yaml"/>
 </launch>
 """
 
 
+INCLUDE = "<sdf version='1.6'><world name='w'><include><uri>model://{}</uri></include></world></sdf>"
+MODEL = """<sdf version='1.6'><model name='m'><link name='l'><visual name='v'><geometry>
+  <mesh><uri>model://table/meshes/top.stl</uri></mesh></geometry></visual></link></model></sdf>"""
+PACKAGE = "<package><name>my_robot</name><version>1.0.0</version><description>.</description></package>"
+
+
 class Stack:
-    """A launch file with a planner configuration, a world and a file that a node is given."""
+    """A launch file whose files are in a folder.
+
+    They are a planner configuration, a world with a model and a mesh, a file that a node is given, and a robot package
+    with a mesh and the controllers of a spawner.
+    """
 
     def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.controllers = folder / "my_robot" / "controllers" / "arm.yaml"
+        self.robot_mesh = folder / "my_robot" / "meshes" / "arm.stl"
+        self.model = folder / "models" / "table" / "model.sdf"
+        self.mesh = folder / "models" / "table" / "meshes" / "top.stl"
+        self.placed = folder / "models" / "can" / "model.sdf"
+        self.metrics = folder / "own.py"
+        for path in (self.controllers, self.robot_mesh, self.model, self.mesh, self.placed):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("1")
+        (folder / "my_robot" / "package.xml").write_text(PACKAGE)
+        self.model.write_text(MODEL)
+        self.metrics.write_text("1")
         self.configuration, self.world, self.poses = folder / "planner.yaml", folder / "a.world", folder / "poses.yaml"
         self.configuration.write_text("planner_configs: {RRTConnect: {range: 0.1}}")
-        self.world.write_text("<sdf/>")
+        self.world.write_text(INCLUDE.format("table"))
         self.poses.write_text("home: 1")
         self.launch = folder / "stack.launch"
-        self.launch.write_text(LAUNCH.format(world=self.world, poses=self.poses))
+        self.launch.write_text(self.text())
 
-    def digests(self) -> dict[str, str]:
+    def text(self, world: str = "a.world") -> str:
+        return LAUNCH.format(world=self.folder / world, poses=self.poses, folder=self.folder)
+
+    def settings(self, **changes: object) -> TaskSettings:
         arguments = {"planner_configuration": str(self.configuration)}
-        settings = TaskSettings(launch=str(self.launch), arguments=arguments)
+        settings = TaskSettings(
+            launch=str(self.launch),
+            arguments=arguments,
+            objects=(PlacedObject("can_1", "can", 0.0, 0.0, 1.0),),
+            metrics=(OwnMetric("own", f"{self.metrics}:own"),),
+        )
+        return replace(settings, **changes)  # type: ignore[arg-type]
+
+    def digests(self, *specs: EpisodeSpec) -> dict[str, str]:
         loaded_stack.cache_clear()  # as in another process
-        return run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
+        return run_digests(specs or [EpisodeSpec(0, {}, 0, 1, self.settings())])
 
 
 @pytest.fixture
-def stack(tmp_path: Path) -> Stack:
+def stack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stack:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}")
+    for cached in (model_resources, robot_files, _files_in, _packages):
+        cached.cache_clear()
     return Stack(tmp_path)
 
 
@@ -55,7 +100,14 @@ def stack(tmp_path: Path) -> Stack:
         ("configuration", "planner_configs: {RRTConnect: {range: 0.2}}", "planner_configs/RRTConnect/range"),
         ("world", "<sdf version='1.7'/>", "/a.world"),
         ("poses", "home: 2", "/poses.yaml"),
-        ("launch", LAUNCH.format(world="", poses=""), "parameter /world_file"),
+        ("launch", LAUNCH.replace("{world}", ""), "parameter /world_file"),
+        ("launch", LAUNCH.replace("<param", "<param name='new' value='1'/><param", 1), "parameter /new"),
+        ("controllers", "2", "file controllers/arm.yaml"),
+        ("robot_mesh", "2", "file meshes/arm.stl"),
+        ("model", MODEL.replace("top", "leg"), "file table/model.sdf"),
+        ("mesh", "2", "file meshes/top.stl"),
+        ("placed", "2", "file can/model.sdf"),
+        ("metrics", "2", "/own.py"),
     ],
 )
 @pytest.mark.parametrize("trials", [2, 4], ids=["run again", "extended"])
@@ -65,7 +117,9 @@ def test_a_file_that_was_edited_between_run_and_extension_is_refused_by_name(
     with open_database(tmp_path / "results.db", create=True) as database:
         database.add_experiment(sample_description(ran_with=stack.digests()), sample_episodes(2))
         assert database.add_experiment(sample_description(ran_with=stack.digests()), sample_episodes(2)) == 1
-        getattr(stack, changed).write_text(text)
+        getattr(stack, changed).write_text(
+            text.format(world=stack.world, poses=stack.poses, folder=stack.folder) if changed == "launch" else text
+        )
         digest = "d1" if trials == 2 else "d2"
         with pytest.raises(ExperimentChangedError, match="ran with another state of ") as caught:
             database.add_experiment(
@@ -80,7 +134,7 @@ def test_a_resumed_experiment_refuses_a_file_that_was_edited_meanwhile_by_name(s
         number = database.add_experiment(sample_description(ran_with=stack.digests()), sample_episodes(2))
         database.check_resumed(number, stack.digests())
         part = {name: value for name, value in stack.digests().items() if name.startswith("file")}
-        database.check_resumed(number, part)  # the remaining episodes may need fewer files
+        database.check_resumed(number, part)  # episodes of other levels may need fewer files
         stack.world.write_text("<sdf version='1.7'/>")
         with pytest.raises(ExperimentChangedError, match="ran with another state of .*/a.world"):
             database.check_resumed(number, stack.digests())
@@ -89,12 +143,33 @@ def test_a_resumed_experiment_refuses_a_file_that_was_edited_meanwhile_by_name(s
 def test_an_extension_with_the_same_files_is_taken_also_with_a_level_that_brings_others(
     stack: Stack, tmp_path: Path
 ) -> None:
-    first = sample_description(ran_with=stack.digests())
-    more = {name: f"{value} 0123" for name, value in stack.digests().items()} | {"file new.yaml": "4567"}
+    def specs(**worlds: str) -> list[EpisodeSpec]:
+        """Returns an episode of each level, with a launch file of its world."""
+        for world in worlds.values():
+            (tmp_path / f"{world}.launch").write_text(stack.text(world))
+        launches = {level: str(tmp_path / f"{world}.launch") for level, world in worlds.items()}
+        return [
+            EpisodeSpec(number, {"place": level}, 0, 1, stack.settings(launch=launch))
+            for number, (level, launch) in enumerate(launches.items())
+        ]
+
+    def described(digest: str, episodes: list[EpisodeSpec]) -> ExperimentDescription:
+        factors = (Factor("place", tuple(spec.configuration["place"] for spec in episodes)),)
+        ran_with = stack.digests(*episodes)
+        return sample_description(digest=digest, factors=factors, compared="place", ran_with=ran_with)
+
+    (tmp_path / "b.world").write_text(INCLUDE.format("can"))
+    one, two = specs(near="a.world"), specs(near="a.world", far="b.world")
     with open_database(tmp_path / "results.db", create=True) as database:
-        database.add_experiment(first, sample_episodes(2))
-        database.add_experiment(replace(first, digest="d2", ran_with=more), sample_episodes(4))
-        assert len(database.pending(1)) == len(sample_episodes(4))
+        database.add_experiment(described("d1", one), one)
+        database.add_experiment(described("d2", two), two)
+        assert len(database.pending(1)) == 2
+        database.write(1, sample_record(two[0]))
+        database.check_resumed(1, stack.digests(two[1]))
+        swapped = specs(near="a.world", far="b.world")
+        (tmp_path / "b.world.launch").write_text(stack.text("a.world"))
+        with pytest.raises(ExperimentChangedError, match="parameter /world_file"):
+            database.add_experiment(described("d2", swapped), swapped)
 
 
 def test_the_states_of_a_user_count(stack: Stack, tmp_path: Path) -> None:
@@ -105,10 +180,8 @@ def test_the_states_of_a_user_count(stack: Stack, tmp_path: Path) -> None:
     found = []
     for content in ("WAIT_S = 1", "WAIT_S = 2"):
         (states / "my_state.py").write_text(content)
-        arguments = {"planner_configuration": str(stack.configuration), "states_directory": str(states)}
-        loaded_stack.cache_clear()
-        settings = TaskSettings(launch=str(stack.launch), arguments=arguments)
-        digests = run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
+        arguments = {"planner_configuration": str(stack.configuration), "states_directory": f"{tmp_path}/my:{states}"}
+        digests = stack.digests(EpisodeSpec(0, {}, 0, 1, stack.settings(arguments=arguments)))
         found.append(digests["folder states_directory"])
     assert found[0] != found[1]
 
@@ -123,3 +196,11 @@ def test_a_mode_without_launch_counts_its_robot_and_method() -> None:
     settings = GraspSettings(robot="ur5_ezgripper_moveit_config", method=method)
     digests = run_digests([EpisodeSpec(0, {}, 0, 1, settings)])
     assert {"package top_down_grasps", "package modular_framework_planning"} <= set(digests)
+    assert {"robot description", "robot meshes", "file collision/base.stl"} <= set(digests)
+
+
+def test_the_package_of_a_plugin_counts(stack: Stack) -> None:
+    assert "package top_down_grasps" in stack.digests()
+    parameters = {"/arm/type": "antipodal_grasps/Hardware"}
+    digests = stack.digests(EpisodeSpec(0, {}, 0, 1, stack.settings(parameters=parameters)))
+    assert "package antipodal_grasps" in digests and "package antipodal_grasps" not in stack.digests()

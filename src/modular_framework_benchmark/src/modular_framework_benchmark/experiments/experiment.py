@@ -95,6 +95,6 @@ class Experiment:
 
         Args:
             digest: Digest of everything that determines the episodes.
-            ran_with: Digests of the software that runs, from `run_digests`.
+            ran_with: Digests of the software and files that run, from `run_digests`.
         """
-        return replace(self.description, digest=digest, ran_with={**self.files, **ran_with})
+        return replace(self.description, digest=digest, ran_with=dict(ran_with))

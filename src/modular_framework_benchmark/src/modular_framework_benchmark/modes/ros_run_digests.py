@@ -1,33 +1,63 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Digests of the software and files of an experiment's episodes, which an extension of the experiment must reproduce.
 
-The digests of a launch file cover its parameters, the files given to its nodes, and the packages of its nodes.
+The digests of a launch file cover its parameters, the packages of its nodes and plugins, and the files that its
+arguments, parameters and nodes name: by path, or by package and name, as a node that loads the file itself.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
+import rospkg
+
+from modular_framework_benchmark.episodes.ros_file_digests import (
+    file_digest,
+    files_with_named,
+    model_file,
+    model_resources,
+    portable_name,
+    robot_digests,
+    robot_files,
+    world_files,
+)
+from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest, tree_files
+from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTIONS, MODEL_PATH, WORLD
 from modular_framework_benchmark.episodes.ros_stack_launch import StackPreview, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
+from modular_framework_benchmark.experiments.metric_choices import metric_files
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.robot_setting import ModelSettings, RobotSource
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
+from modular_framework_benchmark.records.level_digests import FILE, combination_key, digests_text
 
 FOLDERS = ("states_directory", "templates_directory")
-"""Launch arguments that name a folder of the user's code."""
+"""Launch arguments that name folders of the user's code."""
 LIBRARIES = tuple(
     f"modular_framework_{name}"
     for name in ("benchmark", "control", "core", "planning", "ros", "simulation", "states", "urdf")
 )
+MAX_TEXT = 1024
+"""Maximum length of a parameter that may name a file or package; longer parameters are documents."""
+
+Digests = Iterator[tuple[str, str]]
+"""Descriptions with digests."""
 
 
 def run_digests(episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
-    """Returns the digests of all software and files, keyed by description; several digests are separated by spaces.
+    """Returns the digests of all software and files, keyed by description; see `records.level_digests`.
 
     Args:
         episodes: Episodes of the experiment.
@@ -35,20 +65,51 @@ def run_digests(episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
     Raises:
         SettingsError: A launch file is invalid.
     """
-    found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
-    packages, stacks = set(LIBRARIES), dict[int, StackPreview]()
-    for settings in (spec.settings for spec in episodes):
-        packages |= settings.packages
-        if isinstance(settings, TaskSettings):
-            stack = preview_stack(settings)
-            stacks[id(stack)] = stack
-    for stack in stacks.values():
-        packages |= {node.package for node in stack.preview.nodes}
-        for description, digest in _launch_digests(stack):
-            found.setdefault(description, set()).add(digest[:16])
-    for package in packages:
-        found[f"package {package}"] = {package_source(package)[1][:16]}
-    return {description: " ".join(sorted(digests)) for description, digests in sorted(found.items())}
+    sources: dict[str, tuple[Callable[[], Digests], set[str]]] = {}
+    combinations: set[str] = set()
+    for spec in episodes:
+        combination = combination_key(spec.configuration)
+        combinations.add(combination)
+        for key, digests in _sources(spec.settings):
+            sources.setdefault(key, (digests, set()))[1].add(combination)
+    found: dict[str, dict[str, set[str]]] = {}
+    for digests, users in sources.values():
+        for description, digest in digests():
+            by_combination = found.setdefault(description, {key: set() for key in combinations})
+            for key in users:
+                by_combination[key].add(digest[:16])
+    return {description: digests_text(digests) for description, digests in sorted(found.items())}
+
+
+def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Digests]]]:
+    """Yields functions that compute digests of what an episode uses, each with a key: equal keys have equal digests."""
+    yield "libraries", _library_digests
+    for package in settings.packages:
+        yield f"package {package}", functools.partial(_package_digests, package)
+    files = [*settings.files, *metric_files(settings.metrics)]
+    if isinstance(settings, PlanningSettings):
+        files += [Path(settings.problem.scene), Path(settings.problem.request)]
+    for file in files:
+        yield f"file {file}", functools.partial(_file_digests, file, "")
+    if isinstance(settings, ModelSettings):
+        yield f"robot {settings.robot}", functools.partial(_robot_digests, settings.robot)
+    model_path = ""
+    if isinstance(settings, TaskSettings):
+        stack = preview_stack(settings)
+        model_path = str(stack.preview.parameters.get(MODEL_PATH, ""))
+        changed = json.dumps(settings.parameters, sort_keys=True, default=str)
+        yield f"stack {id(stack)} {changed}", functools.partial(_stack_digests, stack, settings.parameters)
+    if isinstance(settings, TaskSettings | GraspSettings):
+        for placed in settings.objects:
+            file = model_file(placed.model, model_path)
+            yield f"model {file}", functools.partial(_file_digests, file, model_path)
+
+
+def _library_digests() -> Digests:
+    for name in PACKAGES:
+        yield f"Python package {name}", _python_version(name)
+    for name in LIBRARIES:
+        yield from _package_digests(name)
 
 
 def _python_version(name: str) -> str:
@@ -58,21 +119,119 @@ def _python_version(name: str) -> str:
         return "none"
 
 
-def _launch_digests(stack: StackPreview) -> Iterator[tuple[str, str]]:
-    texts = [str(stack.launch.arguments[name]) for name in sorted(stack.launch.arguments)]
+def _package_digests(package: str) -> Digests:
+    yield f"package {package}", package_source(package)[1]
+
+
+def _file_digests(file: Path, model_path: str) -> Digests:
+    """Yields the digests of a file and of the files that it names; nothing if the file does not exist."""
+    if file.is_file():
+        yield from _digests_of(files_with_named(file, model_resources(model_path)))
+
+
+def _digests_of(files: Iterable[Path]) -> Digests:
+    for file in files:
+        yield f"{FILE}{portable_name(file)}", file_digest(file)
+
+
+def _robot_digests(source: RobotSource) -> Digests:
+    try:
+        robot = load_robot(source)
+    except ModeError:  # every episode will be broken, with this error as its cause
+        return
+    urdf, srdf, *_ = robot.model.source
+    yield from robot_digests(urdf, srdf, robot.mesh_folder).items()
+    yield from _digests_of(robot_files(urdf, robot.mesh_folder))
+
+
+def _stack_digests(stack: StackPreview, changed: Mapping[str, Any]) -> Digests:
+    """Yields the digests of a launch.
+
+    Args:
+        stack: Launch with its parameters and nodes.
+        changed: Parameters that override those of the launch.
+    """
     for name, value in stack.preview.parameters.items():
         yield f"parameter {name}", _digest(json.dumps(value, sort_keys=True, default=str))
-        texts.append(str(value))
-    arguments = {
-        argument for text in (*texts, *(node.arguments for node in stack.preview.nodes)) for argument in text.split()
-    }
-    for file in sorted(Path(argument) for argument in arguments if argument.startswith("/") and len(argument) < 1024):
-        if file.is_file():
-            yield f"file {file.parent.name}/{file.name}", hashlib.sha256(file.read_bytes()).hexdigest()
+    parameters = stack.preview.with_parameters(changed).parameters
+    texts = [
+        *(node.arguments for node in stack.preview.nodes),
+        *(text for value in (stack.launch.arguments, *parameters.values()) for text in _texts(value)),
+    ]
+    resources = model_resources(str(parameters.get(MODEL_PATH, "")))
+    named = _Named()
+    for text in texts:
+        named.add(text)
+    files = [path for file in named.files for path in files_with_named(file, resources)]
+    files += [
+        *world_files(str(parameters.get(WORLD, "")), resources),
+        *robot_files(str(parameters.get(DESCRIPTIONS[0], ""))),
+    ]
+    yield from _digests_of(dict.fromkeys(files))
+    for package in {node.package for node in stack.preview.nodes} | named.packages:
+        yield from _package_digests(package)
     for name in FOLDERS:
-        folder = str(stack.launch.arguments.get(name, ""))
-        if folder and Path(folder).is_dir():
-            yield f"folder {name}", tree_digest([Path(folder)])
+        folders = [Path(entry) for entry in str(stack.launch.arguments.get(name, "")).split(os.pathsep) if entry]
+        if folders:
+            yield f"folder {name}", tree_digest([folder for folder in folders if folder.is_dir()])
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yields the texts in a parameter that may name files or packages."""
+    if isinstance(value, Mapping | list | tuple):
+        for inner in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(inner)
+    elif isinstance(value, str) and len(value) < MAX_TEXT:
+        yield value
+
+
+class _Named:
+    """Files and packages that texts name.
+
+    Attributes:
+        files: Existing files: named by path, as PACKAGE/NAME, or as PACKAGE and later NAME.
+        packages: Packages of which a name is no file, such as the class of a plugin.
+    """
+
+    def __init__(self) -> None:
+        self.files: dict[Path, None] = {}
+        self.packages: set[str] = set()
+
+    def add(self, text: str) -> None:
+        """Adds what a text names, such as the arguments of a node."""
+        package = ""
+        for word in text.split():
+            first, _, rest = word.partition("/")
+            if word.startswith("/"):
+                self._add_files([Path(word)] if Path(word).is_file() else [])
+            elif not rest and word in _packages():
+                package = word
+            elif rest and first in _packages():
+                if not self._add_files(_files_in(first, rest)):
+                    self.packages.add(first)
+            elif package:
+                self._add_files(_files_in(package, word))
+
+    def _add_files(self, files: Iterable[Path]) -> bool:
+        found = dict.fromkeys(files)
+        self.files.update(found)
+        return bool(found)
+
+
+@functools.cache
+def _packages() -> Mapping[str, Path]:
+    """Returns the folders of all packages, by name."""
+    packages = rospkg.RosPack()
+    return {name: Path(packages.get_path(name)) for name in packages.list()}
+
+
+@functools.lru_cache(maxsize=256)
+def _files_in(package: str, name: str) -> list[Path]:
+    """Returns the files of a package whose path ends with a relative name, in any folder of the package."""
+    parts = Path(name).parts
+    if not Path(name).suffix:
+        return []
+    return sorted(file for file in tree_files(_packages()[package]) if file.parts[-len(parts) :] == parts)
 
 
 def _digest(text: str) -> str:

@@ -114,7 +114,8 @@ class ExperimentDescription:
         confidence: Confidence level of the intervals, such as 0.95.
         sequential: Whether a stopping rule makes interim analyses, so that comparisons must be anytime-valid.
         source: Path of the experiment file, whose folder is the base of its relative paths; "" if unknown.
-        ran_with: Digests of everything that episodes use beside their settings, by description; empty if unknown.
+        ran_with: Digests of everything that episodes use beside their settings, by description, in the form of
+            `level_digests`; empty if unknown.
         extended: Whether episodes were added after others had finished, which is an interim analysis.
     """
 

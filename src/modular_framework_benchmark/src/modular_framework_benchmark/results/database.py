@@ -230,8 +230,9 @@ class ResultDatabase:
         Raises:
             ExperimentChangedError: A file, a package or a parameter is different.
         """
+        pending = self.pending(number)
         with self._reading() as connection:
-            check_resumed(self._description(connection, number), ran_with)
+            check_resumed(self._description(connection, number), ran_with, pending)
 
     def pending(self, number: int) -> list[EpisodeSpec]:
         """Returns the unfinished episodes of an experiment in the order of the run."""

@@ -17,6 +17,7 @@ from sqlalchemy import Connection, RowMapping, column, func, insert, select, tab
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription
+from modular_framework_benchmark.records.level_digests import ABSENT, FILE, combination_key, digests_of
 from modular_framework_benchmark.results.columns import (
     add_metric_columns,
     check_names,
@@ -57,7 +58,7 @@ def store_experiment(
     else:
         number = stored.id
         old = description_from_json(stored.content)
-        _check_ran_with(old, description)
+        _check_extended(connection, number, old, description)
         new = {} if stored.digest == description.digest else _new_episodes(connection, number, old, description, specs)
         analysed = bool(new) or (old.sequential and not description.sequential)
         description = replace(description, extended=old.extended or (analysed and _any_finished(connection, number)))
@@ -89,24 +90,47 @@ def _by_key(description: ExperimentDescription, episodes: Sequence[EpisodeSpec])
     return specs
 
 
-def _check_ran_with(old: ExperimentDescription, new: ExperimentDescription) -> None:
-    """Refuses changed files, packages or parameters; new levels may add new ones."""
-    if new.ran_with:
-        _refuse_changed(new.name, [name for name, digests in old.ran_with.items() if _beyond(digests, new, name)])
+def _check_extended(
+    connection: Connection, number: int, old: ExperimentDescription, new: ExperimentDescription
+) -> None:
+    """Refuses changed files, packages or parameters of stored combinations of levels."""
+    if old.ran_with and new.ran_with:
+        keys = _stored_combinations(connection, number)
+        changed = [name for name in old.ran_with | new.ran_with if any(_changed(old, new, name, key) for key in keys)]
+        _refuse_changed(new.name, changed)
 
 
-def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str]) -> None:
+def _changed(old: ExperimentDescription, new: ExperimentDescription, name: str, combination: str) -> bool:
+    """Returns whether a combination lacks digests that it had, or uses content that it did not use."""
+    had, has = (digests_of(side.ran_with.get(name, ABSENT), combination) for side in (old, new))
+    return not had <= has or bool(has and not had and not name.startswith(FILE))
+
+
+def _stored_combinations(connection: Connection, number: int) -> list[str]:
+    columns = EPISODES.c
+    rows = connection.execute(select(columns.configuration).where(columns.descriptionid == number).distinct())
+    return [combination_key(json.loads(text)) for text in rows.scalars()]
+
+
+def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str], pending: Sequence[EpisodeSpec]) -> None:
     """Checks that the remaining episodes of an experiment use the same files, packages and parameters as the first.
 
     Args:
         stored: Description of the experiment in the database.
         ran_with: Digests for the remaining episodes, see `run_digests`.
+        pending: The remaining episodes.
 
     Raises:
         ExperimentChangedError: A file, a package or a parameter is different.
     """
     if stored.ran_with:
-        _refuse_changed(stored.name, [name for name, digests in ran_with.items() if _beyond(digests, stored, name)])
+        keys = {combination_key(spec.configuration) for spec in pending}
+        changed = [
+            name
+            for name, digests in ran_with.items()
+            if any(digests_of(digests, key) - digests_of(stored.ran_with.get(name, ABSENT), key) for key in keys)
+        ]
+        _refuse_changed(stored.name, changed)
 
 
 def _refuse_changed(experiment: str, changed: list[str]) -> None:
@@ -116,11 +140,6 @@ def _refuse_changed(experiment: str, changed: list[str]) -> None:
             f"the database has episodes of {experiment!r} that ran with another state of {names}; allowed: the same "
             "state; restore it, or give the experiment another name, or use another database"
         )
-
-
-def _beyond(digests: str, description: ExperimentDescription, name: str) -> set[str]:
-    """Returns the digests that a description does not have under a name."""
-    return set(digests.split()) - set(description.ran_with.get(name, "").split())
 
 
 def _new_episodes(
