@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -102,6 +103,25 @@ def metrics() -> tuple[Metric, ...]:
             description="Of the object in the gripper, while lifted.",
         ),
     )
+
+
+def snapshot_of(spec: EpisodeSpec) -> dict[str, Any]:
+    """Returns a snapshot with the parts of a real record; planner and world are those of the levels."""
+    planner, item = spec.configuration["motion_planner"], spec.configuration["object"]
+    return {
+        "version": "v0.1.0",
+        "git_revision": "0f3c9d2",
+        "git_changed": False,
+        "packages": {"ompl": "2.0.1", "numpy": "2.4.6"},
+        "ros_packages": {"rospy": "1.15.15"},
+        "machine": {"host": "lab-pc", "cores": 8},
+        "reference_s": 0.1,
+        "others_share": 0.0,
+        "seed": spec.seed,
+        "planners": {f"{planner} of ompl": {"range": 0.1, "implementation": "OMPL"}},
+        "physics_engine": "pybullet",
+        "digests": {"world": f"digest of the world with {item}"},
+    }
 
 
 @dataclass(frozen=True)
@@ -215,7 +235,7 @@ class ReportedExperiment:
             spec, status, outcome="success" if success else "fail", cause=cause, begun=begun, wall_s=wall_s,
             simulated_s=values["task_time"], metrics=values,
             spans=self._spans(spec, status, cause, float(values["planning_time"] or 1.0)) if self.with_spans else (),
-            snapshot={"git_revision": "0f3c9d2", "hostname": "lab-pc", "versions": {"ompl": "2.0.1", "numpy": "2.4.6"}},
+            snapshot=snapshot_of(spec),
             folder=f"{self.name}_files/{spec.number:06d}", worker=f"worker-{spec.number % 2}",
         )  # fmt: skip
 

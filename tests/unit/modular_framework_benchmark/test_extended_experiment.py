@@ -14,7 +14,7 @@ from modular_framework_benchmark.episodes.ros_file_digests import model_resource
 from modular_framework_benchmark.episodes.ros_stack_launch import loaded_stack
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
-from modular_framework_benchmark.modes.ros_run_digests import _files_in, _packages, run_digests
+from modular_framework_benchmark.modes.ros_run_digests import files_in_package, package_folders, run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import OwnMetric, PlacedObject
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor
@@ -89,7 +89,7 @@ class Stack:
 @pytest.fixture
 def stack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stack:
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}")
-    for cached in (model_resources, robot_files, _files_in, _packages):
+    for cached in (model_resources, robot_files, files_in_package, package_folders):
         cached.cache_clear()
     return Stack(tmp_path)
 

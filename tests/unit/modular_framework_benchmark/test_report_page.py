@@ -121,7 +121,7 @@ def test_the_experiment_file_stands_there_verbatim_and_can_be_saved(page: Page) 
 
 
 def test_it_says_versions_machine_and_how_to_run_it_again(page: Page) -> None:
-    for text in ("0f3c9d2", "lab-pc", "versions.ompl", "run_experiment planners_on_two_objects.yaml"):
+    for text in ("0f3c9d2", "lab-pc", "packages.ompl", "run_experiment planners_on_two_objects.yaml"):
         assert text in page.words
 
 

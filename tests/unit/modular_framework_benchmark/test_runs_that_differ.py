@@ -17,8 +17,12 @@ from sample_experiment import sample_description, sample_episodes, sample_record
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
 from modular_framework_benchmark.episodes.snapshot import RUN_MARK, MachineLoad, reference_s
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.experiment import Factor
+from modular_framework_benchmark.records.level_digests import combination_key, digests_text
 from modular_framework_benchmark.reports.report_source import open_source
-from modular_framework_benchmark.reports.run_record import recorded_values, warnings_of
+from modular_framework_benchmark.reports.run_record import warnings_of
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_ros.reported_figures import Clock
 
@@ -56,8 +60,7 @@ def page_text(path: str) -> str:
 
 def warnings(path: str) -> str:
     with open_source(path, None) as opened:
-        recorded = recorded_values(opened.snapshots)
-        return " ".join(warnings_of(opened.results, recorded, opened.snapshots))
+        return " ".join(warnings_of(opened.results, opened.snapshots, opened.combinations))
 
 
 @pytest.mark.parametrize(
@@ -108,6 +111,84 @@ def test_compare_marks_settings_and_files_that_differ_and_not_those_that_a_facto
     shown = capsys.readouterr().out
     assert "settings.parameters./robot_speed_factor: before 1.0; after 0.5" in shown
     assert "other content of file a.world" in shown and "settings.method" not in shown
+
+
+@pytest.mark.parametrize(
+    ("after", "text"),
+    [
+        ({"slow": 0.3, "fast": 1.0}, "settings.parameters./speed with pace=slow: before 0.5; after 0.3"),
+        ({"slow": 1.0, "fast": 0.5}, "settings.parameters./speed with pace=fast: before 1.0; after 0.5"),
+        ({"slow": 0.4, "fast": 0.9}, "settings.parameters./speed with pace=fast: before 1.0; after 0.9"),
+        ({"slow": 0.5, "fast": 1.0, "faster": 2.0}, ""),
+        ({"fast": 1.0}, ""),
+    ],
+)
+def test_compare_marks_what_differs_at_one_level_while_another_stays_equal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], after: dict[str, float], text: str
+) -> None:
+    def run(name: str, levels: dict[str, float]) -> str:
+        episodes = [EpisodeSpec(0, {"pace": level}, 0, 1, TaskSettings()) for level in levels]
+        episodes = [replace(spec, number=number) for number, spec in enumerate(episodes)]
+        digests = {combination_key(spec.configuration): {f"{levels[spec.configuration['pace']]}"} for spec in episodes}
+        description = sample_description(
+            factors=(Factor("pace", tuple(levels)),), compared="pace", ran_with={"file a.yaml": digests_text(digests)}
+        )
+        with open_database(tmp_path / name, create=True) as database:
+            number = database.add_experiment(description, episodes)
+            for spec in episodes:
+                settings = {"parameters": {"/speed": levels[spec.configuration["pace"]]}}
+                database.write(number, sample_record(spec, snapshot={**SNAPSHOT, "settings": settings}))
+        return str(tmp_path / name)
+
+    assert compare([run("before.db", {"slow": 0.5, "fast": 1.0}), run("after.db", after)]) == 0
+    shown = capsys.readouterr().out
+    assert text in shown
+    assert ("other content of file a.yaml" in shown) == ("also differ" in shown) == bool(text)
+
+
+@pytest.mark.parametrize(
+    ("changes", "warning"),
+    [
+        ({"packages": {"numpy": "2.5"}}, "The episodes did not all run with the same packages.numpy: 2.4 (4 "),
+        (
+            {"methods": {"top_down_grasps": {"version": "0.1.0", "sources": "bb"}}},
+            "The episodes did not all run with the same methods.top_down_grasps.sources: aa (4 episodes); bb (4 ",
+        ),
+        ({"digests": {"world": "22"}}, "Episodes with the same levels did not all run with the same digests.world: 11"),
+        (
+            {"planners": {"RRTConnect of ompl": {"range": 0.2, "implementation": "OMPL"}}},
+            "Episodes with the same levels did not all run with the same planners.RRTConnect of ompl.range: 0.1",
+        ),
+        ({"planners": {"RRTConnect of ompl": {"range": 0.1, "implementation": "OMPL"}}}, ""),
+        ({"planners": {}, "digests": {}, "renderer": ""}, ""),
+    ],
+)
+def test_a_report_warns_of_workers_that_ran_with_other_software(
+    tmp_path: Path, changes: dict[str, Any], warning: str
+) -> None:
+    path = tmp_path / "results.db"
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(), sample_episodes(2))
+        for spec in sample_episodes(2):
+            # the second trial runs on another worker
+            own = {"digests": {"world": "11"}, "renderer": "tiny", **(changes if spec.trial else {})}
+            database.write(number, sample_record(spec, snapshot={**SNAPSHOT, **own}))
+    text = warnings(str(path))
+    assert ("did not all run" in text) == bool(warning) and warning in text
+
+
+def test_methods_that_ran_on_workers_with_other_packages_give_a_warning_and_worlds_of_levels_give_none(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "results.db"
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(), sample_episodes(2))
+        for spec in sample_episodes(2):
+            version = "2.4" if spec.configuration["grasp_method"] == "top_down" else "2.5"
+            own = {"digests": {"world": spec.configuration["object"]}, "packages": {"numpy": version}}
+            database.write(number, sample_record(spec, snapshot={**SNAPSHOT, **own}))
+    text = warnings(str(path))
+    assert text.count("did not all run") == 1 and "the same packages.numpy: 2.4 (4 episodes); 2.5 (4 episodes)" in text
 
 
 def test_compare_marks_nothing_where_only_measurements_differ(

@@ -11,9 +11,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rospkg
 
-from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.episode_record import SNAPSHOT_KEYS, EpisodeEnd, make_record
 from modular_framework_benchmark.episodes.ros_file_digests import robot_digests
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
@@ -22,6 +24,7 @@ from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.snapshot_parts import SNAPSHOT_PARTS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_planning.plan_statistics import PlannerRun
 
@@ -63,7 +66,7 @@ def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Pat
     assert snapshot["physics_engine"] == "mujoco"
     assert snapshot["controllers"] == {"arm": "position_controllers/JointTrajectoryController"}
     assert snapshot["renderer"] == "tiny"
-    assert set(snapshot["digests"]) == {"robot description", "world", "task", "controllers"}
+    assert set(snapshot["digests"]) == {"robot description", "world", "task", "controller arm"}
     assert snapshot["digests"]["task"] == hashlib.sha256(b"name: pick").hexdigest()
 
 
@@ -99,7 +102,7 @@ def test_the_digests_of_world_robot_and_objects_cover_the_files_that_they_name(t
 
     before = digests()
     assert digests() == before
-    assert {name for name, digest in digests(2.0).items() if digest != before[name]} == {"controllers"}
+    assert {name for name, digest in digests(2.0).items() if digest != before[name]} == {"controller arm"}
     for file, name in {
         "models/shelf/a.stl": "world",
         "models/can/b.stl": "object can/model.sdf",
@@ -109,6 +112,22 @@ def test_the_digests_of_world_robot_and_objects_cover_the_files_that_they_name(t
         after = digests()
         assert {each for each, digest in after.items() if digest != before[each]} == {name}
         before = after
+
+
+def test_every_part_of_a_record_is_declared(tmp_path: Path) -> None:
+    task = record_of(tmp_path, stack(tmp_path)).snapshot
+    report = ComponentReport("planning", "boxes", True, "", 0.0, 1.0, wall_s=1.0, ran=UsedSoftware())
+    spec = EpisodeSpec(0, {}, 0, 1, TaskSettings(metrics=("success",)))
+    single = measured_record(spec, EpisodeStatus.SUCCEEDED, "", report=report, folder=tmp_path, watch=Stopwatch())
+    assert task.keys() | single.snapshot.keys() | set(SNAPSHOT_KEYS) <= SNAPSHOT_PARTS.keys()
+
+
+def test_a_record_says_the_versions_of_the_environment(tmp_path: Path) -> None:
+    snapshot = record_of(tmp_path, stack(tmp_path)).snapshot
+    assert snapshot["packages"]["numpy"] == np.__version__
+    manifest = Path(rospkg.RosPack().get_path("rospy")) / "package.xml"
+    assert f"<version>{snapshot['ros_packages']['rospy']}</version>" in manifest.read_text()
+    assert len(snapshot["environment"]) == 64
 
 
 def test_a_record_says_by_which_method_poses_were_solved_and_for_which_plugin(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def _compare(given: argparse.Namespace) -> int:
     ):
         differing = (
             *differences_of(before.compared_snapshots, after.compared_snapshots),
-            *content_differences(before.results.description, after.results.description),
+            *content_differences(before.results, after.results),
         )
         regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
         print(regression_text(regression), end="")

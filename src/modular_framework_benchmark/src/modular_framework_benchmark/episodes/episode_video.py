@@ -22,9 +22,9 @@ import rospkg
 from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.errors import VideoError
-from modular_framework_benchmark.episodes.ros_file_digests import model_file
 from modular_framework_benchmark.metrics.measurements import ObjectTrack
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, objects_of, read_joints, read_recording
+from modular_framework_benchmark.records.episode_settings import model_file
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder

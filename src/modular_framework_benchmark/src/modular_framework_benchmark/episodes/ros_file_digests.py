@@ -16,6 +16,7 @@ from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.models.description_files import SDF_SUFFIXES, description_files, files_in_description
 from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_urdf.mesh_paths import PackageFinder
 
 model_resources = functools.lru_cache(maxsize=16)(ros_resources)
 """Cached search paths of models, by the value of `/gazebo_model_path`."""
@@ -66,17 +67,6 @@ def world_files(name: str, resources: Resources) -> tuple[Path, ...]:
         return ()
 
 
-def model_file(model: str, model_path: str) -> Path:
-    """Returns the SDF file of a placed object.
-
-    Args:
-        model: Name of a model, or absolute path of its file.
-        model_path: Folder of the models.
-    """
-    path = Path(model)
-    return path if path.is_absolute() else Path(model_path) / model / "model.sdf"
-
-
 @functools.lru_cache(maxsize=64)
 def robot_digests(urdf: str, srdf: str, folder: Path | None = None) -> Mapping[str, str]:
     """Returns the SHA-256 of a robot's descriptions and of its meshes, keyed by description.
@@ -104,5 +94,6 @@ def robot_files(urdf: str, folder: Path | None = None) -> tuple[Path, ...]:
     found = files_in_description(urdf, resources) if urdf else ()
     if folder is None:
         return found
-    beside = (files_in_description(urdf, Resources(find_package=find)) for find in (folder.joinpath, lambda _: folder))
+    finders: tuple[PackageFinder, ...] = (lambda name: str(folder / name), lambda _: str(folder))
+    beside = (files_in_description(urdf, Resources(find_package=find)) for find in finders)
     return tuple(dict.fromkeys([*found, *(path for paths in beside for path in paths)]))

@@ -15,13 +15,13 @@ from modular_framework_benchmark.episodes.ros_file_digests import (
     file_digest,
     files_with_named,
     joint_digest,
-    model_file,
     model_resources,
     portable_name,
     robot_digests,
     world_files,
 )
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
+from modular_framework_benchmark.records.episode_settings import model_file
 from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
@@ -84,9 +84,9 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
         path = model_file(model, folder)
         if path.is_file():
             files[f"object {portable_name(path)}"] = files_with_named(path, resources)
-    settings = {name: _value(parameters, name) for name in sorted(controllers)}
-    if settings:
-        digests["controllers"] = hashlib.sha256(json.dumps(settings, sort_keys=True, default=str).encode()).hexdigest()
+    for name in controllers:
+        settings = json.dumps(_value(parameters, name), sort_keys=True, default=str)
+        digests[f"controller {name}"] = hashlib.sha256(settings.encode()).hexdigest()
     joint = {what: joint_digest(paths) for what, paths in files.items() if paths}
     return {**robot_digests(urdf, srdf), **joint, **digests}
 

@@ -14,8 +14,7 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
-from modular_framework_benchmark.episodes.ros_file_digests import model_file
-from modular_framework_benchmark.records.episode_settings import PlacedObject
+from modular_framework_benchmark.records.episode_settings import PlacedObject, model_file
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 

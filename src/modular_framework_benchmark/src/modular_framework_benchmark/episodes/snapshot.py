@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import os
 import platform
 import subprocess
@@ -15,21 +16,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from modular_framework_benchmark.records.results import COLD_START
+import rospkg
 
 PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
 """Packages whose versions affect results."""
 
-VARYING_PARTS = ("seed", "settings", "parameters", "final_objects", COLD_START)
-"""Snapshot parts that differ between episodes by nature."""
+ROS_PACKAGES = ("actionlib", "genpy", "robot_state_publisher", "roscpp", "rosgraph", "roslaunch", "rospy", "tf2_ros")
+"""Packages of ROS whose versions affect results."""
 RUN_MARK = "MODULAR_FRAMEWORK_RUN"
 """Environment variable of every process of a run: RUN/WORKER."""
 
 
 @functools.cache
 def versions() -> dict[str, Any]:
-    """Returns the versions and the git revision of this software, constant within a process."""
+    """Returns the git revision of this software and the versions of its environment, constant within a process."""
     found = {}
     for name in PACKAGES:
         try:
@@ -43,7 +43,22 @@ def versions() -> dict[str, Any]:
         "python": platform.python_version(),
         "ros_distribution": os.environ.get("ROS_DISTRO", ""),
         "packages": found,
+        "ros_packages": {name: _ros_version(name) for name in ROS_PACKAGES},
+        "environment": _environment_digest(),
     }
+
+
+def _ros_version(package: str) -> str:
+    try:
+        return str(rospkg.RosPack.get_instance().get_manifest(package).version)
+    except rospkg.ResourceNotFound:
+        return ""
+
+
+def _environment_digest() -> str:
+    """Returns the SHA-256 of names and versions of all Python packages of this environment, hexadecimal."""
+    found = sorted({f"{package.name}=={package.version}" for package in metadata.distributions()})
+    return hashlib.sha256("\n".join(found).encode()).hexdigest()
 
 
 def _git(*arguments: str) -> str:

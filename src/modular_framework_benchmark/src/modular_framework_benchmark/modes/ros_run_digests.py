@@ -21,7 +21,6 @@ import rospkg
 from modular_framework_benchmark.episodes.ros_file_digests import (
     file_digest,
     files_with_named,
-    model_file,
     model_resources,
     portable_name,
     robot_digests,
@@ -40,7 +39,7 @@ from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeSpec
-from modular_framework_benchmark.records.episode_settings import EpisodeSettings
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, model_file
 from modular_framework_benchmark.records.level_digests import FILE, combination_key, digests_text
 
 FOLDERS = ("states_directory", "templates_directory")
@@ -204,13 +203,13 @@ class _Named:
             first, _, rest = word.partition("/")
             if word.startswith("/"):
                 self._add_files([Path(word)] if Path(word).is_file() else [])
-            elif not rest and word in _packages():
+            elif not rest and word in package_folders():
                 package = word
-            elif rest and first in _packages():
-                if not self._add_files(_files_in(first, rest)):
+            elif rest and first in package_folders():
+                if not self._add_files(files_in_package(first, rest)):
                     self.packages.add(first)
             elif package:
-                self._add_files(_files_in(package, word))
+                self._add_files(files_in_package(package, word))
 
     def _add_files(self, files: Iterable[Path]) -> bool:
         found = dict.fromkeys(files)
@@ -219,19 +218,19 @@ class _Named:
 
 
 @functools.cache
-def _packages() -> Mapping[str, Path]:
+def package_folders() -> Mapping[str, Path]:
     """Returns the folders of all packages, by name."""
     packages = rospkg.RosPack()
     return {name: Path(packages.get_path(name)) for name in packages.list()}
 
 
 @functools.lru_cache(maxsize=256)
-def _files_in(package: str, name: str) -> list[Path]:
+def files_in_package(package: str, name: str) -> list[Path]:
     """Returns the files of a package whose path ends with a relative name, in any folder of the package."""
     parts = Path(name).parts
     if not Path(name).suffix:
         return []
-    return sorted(file for file in tree_files(_packages()[package]) if file.parts[-len(parts) :] == parts)
+    return sorted(file for file in tree_files(package_folders()[package]) if file.parts[-len(parts) :] == parts)
 
 
 def _digest(text: str) -> str:

@@ -19,6 +19,7 @@ from modular_framework_benchmark.reports.distribution_figures import distributio
 from modular_framework_benchmark.reports.failure_groups import Failures, failures_figure, group_failures
 from modular_framework_benchmark.reports.figure_style import NamedFigure
 from modular_framework_benchmark.reports.run_record import (
+    CombinationSnapshots,
     RecordedValue,
     SnapshotValues,
     commands_to_repeat,
@@ -52,6 +53,7 @@ class ReportSource:
         database_folder: Base of the episodes' folders.
         report_folder: Folder of the report, the base of its links.
         snapshots: Distinct values of each snapshot part with their numbers of episodes.
+        combinations: The same by combination of levels.
         span_totals: Sums of all spans for `summarise_spans`.
         spans_of: Function that reads the spans of the episodes with the given numbers.
     """
@@ -60,6 +62,7 @@ class ReportSource:
     database_folder: Path
     report_folder: Path
     snapshots: SnapshotValues
+    combinations: CombinationSnapshots
     span_totals: pd.DataFrame
     spans_of: Callable[[Sequence[int]], pd.DataFrame]
 
@@ -169,7 +172,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
         description=description, planned=results.planned, finished=len(results.episodes),
         facts=_run_facts(results, source.snapshots), analysis=analysis, metrics=metrics, levels=levels, spans=spans,
         chosen=chosen, failures=failures, figures=tuple(figures), recorded=recorded,
-        warnings=warnings_of(results, recorded, source.snapshots),
+        warnings=warnings_of(results, source.snapshots, source.combinations),
         commands=commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import VARYING_PARTS
 from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.snapshot_parts import PartKind, parts_of
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
-from modular_framework_benchmark.reports.run_record import SETTINGS, SnapshotValues
+from modular_framework_benchmark.reports.run_record import CombinationSnapshots, SnapshotValues
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 
 
@@ -33,12 +33,18 @@ class OpenedExperiment:
     @property
     def snapshots(self) -> SnapshotValues:
         """Returns the distinct values of each snapshot part with their numbers of episodes."""
-        return self.database.snapshot_values(self.number, VARYING_PARTS)
+        return self.database.snapshot_values(self.number, parts_of(PartKind.VARYING, PartKind.SETTING))
 
     @property
-    def compared_snapshots(self) -> SnapshotValues:
-        """Returns the snapshots with the settings, in which two experiments may differ."""
-        return self.database.snapshot_values(self.number, [part for part in VARYING_PARTS if part != SETTINGS])
+    def combinations(self) -> CombinationSnapshots:
+        """Returns the values of the snapshots by combination of levels, without those that no warning needs."""
+        left_out = parts_of(PartKind.VARYING, PartKind.SETTING, PartKind.NOTE, PartKind.MEASURED)
+        return self.database.combination_snapshots(self.number, left_out)
+
+    @property
+    def compared_snapshots(self) -> CombinationSnapshots:
+        """Returns the values in which two experiments may differ, including settings, by combination of levels."""
+        return self.database.combination_snapshots(self.number, parts_of(PartKind.VARYING))
 
     def source(self, report_folder: Path) -> ReportSource:
         """Returns the source of a report's further data.
@@ -51,6 +57,7 @@ class OpenedExperiment:
             self.database.folder,
             report_folder,
             self.snapshots,
+            self.combinations,
             self.database.span_totals(self.number),
             lambda episodes: self.database.spans(self.number, episodes),
         )

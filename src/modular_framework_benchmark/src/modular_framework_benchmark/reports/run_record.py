@@ -5,39 +5,29 @@ from __future__ import annotations
 
 import shlex
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
-from modular_framework_benchmark.records.experiment import ExperimentDescription
+from modular_framework_benchmark.experiments.design import DRAWN_SETTINGS
+from modular_framework_benchmark.records.level_digests import all_digests, combination_key, digests_of
 from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.snapshot_parts import REFERENCE, PartKind, kind_of
 from modular_framework_benchmark.records.used_software import IMPLEMENTATION
 from modular_framework_benchmark.reports.number_text import counted
 from modular_framework_ros.reported_figures import Clock
 
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
+CombinationSnapshots = Mapping[str, SnapshotValues]
+"""Snapshots by combination of levels."""
 
-SETTINGS = "settings"
-"""Snapshot part with the settings of an episode."""
 MAX_VALUES = 4
 MAX_NAMES = 12
 MAX_PARAMETERS = 400
 MAX_OTHERS_FRACTION = 0.1
 """Fraction of the machine used by other processes above which real times are doubtful."""
-MEASURED_PARTS = (
-    *("metric_faults", "earlier_tries", "reference_s"),
-    *("load_before", "load_after", "stolen_s", "busy_s", "others_share"),
-)
-"""Measured parts of a snapshot, which are summarised instead of listed."""
 _PER_EPISODE = ("seed", "trial", "number")  # differ between episodes by nature
-_IDENTITY_WORDS = (
-    "revision",
-    "version",
-    "hostname",
-    "machine",
-    "cpu",
-)  # an experiment whose episodes differ in these is inconsistent
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +44,6 @@ class RecordedValue:
     values: tuple[tuple[str, int], ...]
     others: int
 
-    @property
-    def is_decisive(self) -> bool:
-        """Returns whether episodes that differ in this value should not be pooled."""
-        return any(word in self.name.lower() for word in _IDENTITY_WORDS)
-
 
 def recorded_values(snapshots: SnapshotValues) -> tuple[RecordedValue, ...]:
     """Returns the recorded values of the snapshots.
@@ -66,17 +51,27 @@ def recorded_values(snapshots: SnapshotValues) -> tuple[RecordedValue, ...]:
     Args:
         snapshots: Distinct values of each snapshot part with their numbers of episodes.
     """
+    return tuple(_recorded(name, counts) for name, counts in _counts(snapshots).items())[:MAX_PARAMETERS]
+
+
+def _recorded(name: str, counts: Mapping[str, int]) -> RecordedValue:
+    ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+    return RecordedValue(name, tuple(ordered[:MAX_VALUES]), max(len(ordered) - MAX_VALUES, 0))
+
+
+def _counts(snapshots: SnapshotValues) -> dict[str, dict[str, int]]:
+    """Returns the number of episodes of each value, by path of keys."""
     counts: dict[str, dict[str, int]] = {}
     for name, values in snapshots.items():
-        for value, episodes in values if name not in MEASURED_PARTS else ():
+        for value, episodes in values if kind_of(name) is not PartKind.MEASURED else ():
             for path, text in _leaves(value, name):
-                of_path = counts.setdefault(path, {})
-                of_path[text] = of_path.get(text, 0) + episodes
-    recorded = []
-    for name, of_name in counts.items():
-        ordered = sorted(of_name.items(), key=lambda item: -item[1])
-        recorded.append(RecordedValue(name, tuple(ordered[:MAX_VALUES]), max(len(ordered) - MAX_VALUES, 0)))
-    return tuple(recorded[:MAX_PARAMETERS])
+                _add(counts.setdefault(path, {}), {text: episodes})
+    return counts
+
+
+def _add(counts: dict[str, int], more: Mapping[str, int]) -> None:
+    for text, episodes in more.items():
+        counts[text] = counts.get(text, 0) + episodes
 
 
 def _leaves(value: object, name: str) -> Iterator[tuple[str, str]]:
@@ -89,14 +84,14 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, str]]:
 
 
 def warnings_of(
-    results: ExperimentResults, recorded: Sequence[RecordedValue], snapshots: SnapshotValues
+    results: ExperimentResults, snapshots: SnapshotValues, combinations: CombinationSnapshots
 ) -> tuple[str, ...]:
-    """Returns the warnings of a report: unfinished or broken episodes, faults, inconsistent revisions.
+    """Returns the warnings of a report: unfinished or broken episodes, faults, inconsistent software.
 
     Args:
         results: Finished episodes.
-        recorded: Recorded values of the snapshots.
         snapshots: Distinct values of each snapshot part, as for `recorded_values`.
+        combinations: The same by combination of levels.
     """
     episodes = results.episodes
     found = []
@@ -113,11 +108,28 @@ def warnings_of(
             f"{counted(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
             f"{numbers}{more}). They count as failures; the comparisons name the verdicts that depend on them."
         )
-    for item in recorded:
-        if item.is_decisive and len(item.values) + item.others > 1:
-            values = "; ".join(f"{value} ({counted(count, 'episode')})" for value, count in item.values)
-            found.append(f"The episodes did not all run with the same {item.name}: {values}.")
-    return (*found, *_incidents(snapshots), *_load_warning(results, snapshots))
+    return (*found, *_inconsistent(combinations), *_incidents(snapshots), *_load_warning(results, snapshots))
+
+
+def _inconsistent(combinations: CombinationSnapshots) -> Iterator[str]:
+    """Yields decisive values that are not equal in all episodes, or in all episodes with the same levels."""
+    software: dict[str, dict[str, int]] = {}
+    content: dict[str, dict[str, int]] = {}
+    for snapshots in combinations.values():
+        for name, counts in _counts(snapshots).items():
+            if kind_of(name) is PartKind.SOFTWARE:
+                _add(software.setdefault(name, {}), counts)
+            elif kind_of(name) is PartKind.CONTENT and not name.endswith(IMPLEMENTATION):
+                known = {text: episodes for text, episodes in counts.items() if text}
+                if len(known) > 1:
+                    _add(content.setdefault(name, {}), known)
+    for episodes, found in (("The episodes", software), ("Episodes with the same levels", content)):
+        for name, counts in found.items():
+            if len(counts) > 1:
+                values = "; ".join(
+                    f"{text or 'none'} ({counted(count, 'episode')})" for text, count in _recorded(name, counts).values
+                )
+                yield f"{episodes} did not all run with the same {name}: {values}."
 
 
 def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
@@ -151,24 +163,37 @@ def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iter
         )
 
 
-def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, ...]:
+def differences_of(before: CombinationSnapshots, after: CombinationSnapshots) -> tuple[str, ...]:
     """Returns the differences between the runs of two experiments: versions, planners, methods, machine, settings.
 
+    Episodes with the same levels are compared; without common levels all episodes are compared.
+
     Args:
-        before: Snapshots of the earlier experiment, as for `recorded_values`, with the settings.
+        before: Snapshots of the earlier experiment with the settings, by combination of levels.
         after: Snapshots of the later experiment.
     """
-    earlier, later = _values_of(before), _values_of(after)
+    combinations = [name for name in before if name in after]
+    values = [{each: _counts(snapshots) for each, snapshots in side.items()} for side in (before, after)]
+    whole = [_pooled(side.values()) for side in values]
     found = []
-    for name in dict.fromkeys([*earlier, *later]):
-        sides = [side.get(name, {"nothing"}) for side in (earlier, later)]
-        # factors, trials and seeds vary the settings; experiments of the same design share values
-        is_same = bool(sides[0] & sides[1]) if name.startswith(f"{SETTINGS}.") else sides[0] == sides[1]
-        if is_same or name.endswith(IMPLEMENTATION) and name not in earlier.keys() & later:
+    for name in dict.fromkeys([*whole[0], *whole[1]]):
+        sides = [side.get(name, set()) for side in whole]
+        if kind_of(name) is PartKind.SOFTWARE or not combinations or not all(sides):
+            if not _are_same(name, sides, pooled=True):
+                found.append(f"{name}{_difference(sides)}")
             continue
-        texts = [", ".join(sorted(side)[:MAX_VALUES]) for side in sides]
-        found.append(f"{name}: before {texts[0]}; after {texts[1]}")
-    times = [[float(value) for value, _ in side.get("reference_s", ())] for side in (before, after)]
+        texts: dict[str, list[str]] = {}
+        for combination in combinations:
+            sides = [set(side[combination].get(name, ())) for side in values]
+            if all(sides) and not _are_same(name, sides, pooled=False):
+                texts.setdefault(_difference(sides), []).append(combination)
+        for text, of_text in texts.items():
+            where = "" if len(of_text) == len(combinations) else f" with {'; '.join(of_text[:MAX_VALUES])}"
+            found.append(f"{name}{where}{text}")
+    times = [
+        [float(value) for snapshots in side.values() for value, _ in snapshots.get(REFERENCE, ())]
+        for side in (before, after)
+    ]
     if all(times) and any(text.startswith("machine.") for text in found):
         medians = [statistics.median(side) for side in times]
         found.append(
@@ -178,29 +203,66 @@ def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, 
     return tuple(found)
 
 
-def content_differences(before: ExperimentDescription, after: ExperimentDescription) -> tuple[str, ...]:
-    """Returns the files, packages and parameters whose content differs, by digest.
+def _pooled(combinations: Iterable[Mapping[str, Iterable[str]]]) -> dict[str, set[str]]:
+    """Returns the values of all combinations, by path of keys."""
+    pooled: dict[str, set[str]] = {}
+    for counts in combinations:
+        for name, texts in counts.items():
+            pooled.setdefault(name, set()).update(texts)
+    return pooled
+
+
+def _are_same(name: str, sides: Sequence[Set[str]], *, pooled: bool) -> bool:
+    """Returns whether two sets of values show no difference between two experiments.
 
     Args:
-        before: Description of the earlier experiment.
-        after: Description of the later experiment.
+        name: Path of keys.
+        sides: Values before and after; empty if unknown.
+        pooled: Whether the values are those of several combinations of levels.
     """
-    names = [
-        name
-        for name, digests in before.ran_with.items()
-        if name in after.ran_with and not set(digests.split()) & set(after.ran_with[name].split())
-    ]
+    before, after = sides
+    if name.endswith(IMPLEMENTATION) and not (before and after):
+        return True
+    if kind_of(name) is PartKind.SETTING and (pooled or name.split(".")[1] in DRAWN_SETTINGS):
+        return bool(before & after)  # levels, trials and seeds vary the settings
+    if pooled:
+        return before == after
+    return before <= after or after <= before  # the number of episodes decides which values occur
+
+
+def _difference(sides: Sequence[Set[str]]) -> str:
+    texts = [", ".join(sorted(side)[:MAX_VALUES]) or "nothing" for side in sides]
+    return f": before {texts[0]}; after {texts[1]}"
+
+
+def content_differences(before: ExperimentResults, after: ExperimentResults) -> tuple[str, ...]:
+    """Returns the files, packages and parameters whose content differs, by digest, for the same levels.
+
+    Without common levels, contents differ if no digest is common.
+
+    Args:
+        before: Finished episodes of the earlier experiment.
+        after: Finished episodes of the later experiment.
+    """
+    earlier, later = before.description.ran_with, after.description.ran_with
+    keys = _combination_keys(before) & _combination_keys(after)
+    names = []
+    for name in earlier.keys() & later:
+        if keys:
+            sides = [(digests_of(earlier[name], key), digests_of(later[name], key)) for key in keys]
+        else:
+            sides = [(all_digests(earlier[name]), all_digests(later[name]))]
+        if any(had and has and not (had <= has or has <= had if keys else had & has) for had, has in sides):
+            names.append(name)
+    names.sort()
     more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
     return (f"other content of {', '.join(names[:MAX_NAMES])}{more}",) if names else ()
 
 
-def _values_of(snapshots: SnapshotValues) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
-    for name, values in snapshots.items():
-        for value, _ in values if name not in MEASURED_PARTS else ():
-            for path, text in _leaves(value, name):
-                found.setdefault(path, set()).add(text)
-    return found
+def _combination_keys(results: ExperimentResults) -> set[str]:
+    factors = [factor.name for factor in results.description.factors]
+    levels = results.episodes[factors].drop_duplicates().to_dict("records")
+    return {combination_key({str(name): str(level) for name, level in each.items()}) for each in levels}
 
 
 def commands_to_repeat(results: ExperimentResults, recorded: Sequence[RecordedValue], database: str) -> tuple[str, ...]:

@@ -326,6 +326,14 @@ class ResultDatabase:
             self._description(connection, number)
             return result_tables.snapshot_values(connection, number, leave_out)
 
+    def combination_snapshots(
+        self, number: int, leave_out: Collection[str] = ()
+    ) -> dict[str, dict[str, list[tuple[Any, int]]]]:
+        """Returns the values of `snapshot_values` by combination of levels."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            return result_tables.combination_snapshots(connection, number, leave_out)
+
     def _description(self, connection: Connection, number: int) -> ExperimentDescription:
         if number not in self._descriptions:
             row = connection.execute(select(DESCRIPTIONS.c.content).where(DESCRIPTIONS.c.id == number)).one_or_none()

@@ -96,7 +96,9 @@ def _check_extended(
     """Refuses changed files, packages or parameters of stored combinations of levels."""
     if old.ran_with and new.ran_with:
         keys = _stored_combinations(connection, number)
-        changed = [name for name in old.ran_with | new.ran_with if any(_changed(old, new, name, key) for key in keys)]
+        changed = [
+            name for name in {**old.ran_with, **new.ran_with} if any(_changed(old, new, name, key) for key in keys)
+        ]
         _refuse_changed(new.name, changed)
 
 

@@ -151,24 +151,55 @@ def snapshot_values(
     Returns:
         Distinct values of each part with their numbers of episodes, most frequent first, keyed by part name.
     """
+    return _values_by_combination(connection, number, leave_out, pooled=True).get("", {})
+
+
+def combination_snapshots(
+    connection: Connection, number: int, leave_out: Collection[str] = ()
+) -> dict[str, dict[str, list[tuple[Any, int]]]]:
+    """Returns the distinct values of the snapshots, as `snapshot_values`, by combination of levels: "method=a, x=1".
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+        leave_out: Names of the parts to skip.
+    """
+    return _values_by_combination(connection, number, leave_out, pooled=False)
+
+
+def _values_by_combination(
+    connection: Connection, number: int, leave_out: Collection[str], *, pooled: bool
+) -> dict[str, dict[str, list[tuple[Any, int]]]]:
+    """Returns the distinct values of the snapshots; pooled values have the combination ""."""
     rows = connection.execute(
-        select(RECORDS.c.snapshot, func.count())
+        select(EPISODES.c.configuration, RECORDS.c.snapshot, func.count())
         .join_from(EPISODES, RECORDS, RECORDS.c.runid == EPISODES.c.id)
         .where(EPISODES.c.descriptionid == number)
-        .group_by(RECORDS.c.snapshot)
+        .group_by(EPISODES.c.configuration, RECORDS.c.snapshot)
     )
-    counts: dict[int, int] = {}
-    for text, count in rows:
+    counts: dict[str, dict[int, int]] = {}
+    for configuration, text, count in rows:
+        of_combination = counts.setdefault("" if pooled else _combination_text(configuration), {})
         for value in json.loads(text).values():
-            counts[value] = counts.get(value, 0) + count
-    found: dict[str, list[tuple[Any, int]]] = {}
+            of_combination[value] = of_combination.get(value, 0) + count
     columns = SNAPSHOT_VALUES.c
-    for value in connection.execute(
+    stored = connection.execute(
         select(columns.id, columns.name, columns.value).where(columns.name.not_in(leave_out)).order_by(columns.id)
-    ):
-        if value.id in counts:
-            found.setdefault(value.name, []).append((json.loads(value.value), counts[value.id]))
-    return {name: sorted(values, key=lambda each: -each[1]) for name, values in sorted(found.items())}
+    )
+    used = set[int]().union(*counts.values())
+    values = [(each.id, each.name, json.loads(each.value)) for each in stored if each.id in used]
+    found: dict[str, dict[str, list[tuple[Any, int]]]] = {}
+    for combination, of_combination in sorted(counts.items()):
+        parts: dict[str, list[tuple[Any, int]]] = {}
+        for key, name, value in values:
+            if key in of_combination:
+                parts.setdefault(name, []).append((value, of_combination[key]))
+        found[combination] = {name: sorted(parts[name], key=lambda each: -each[1]) for name in sorted(parts)}
+    return found
+
+
+def _combination_text(configuration: str) -> str:
+    return ", ".join(f"{name}={level}" for name, level in sorted(json.loads(configuration).items()))
 
 
 def _flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
