@@ -451,7 +451,7 @@ CASES = [
     in_experiment(TASK, ("launch",), "modular_framework_api/start_framwork.launch", "did you mean 'start_framework"),
     in_experiment(TASK, ("task",), "simulation_pik.yaml", "did you mean 'simulation_pick.yaml'"),
     in_experiment(TASK, ("objects", 0, "model"), "cub", "did you mean 'cube'"),
-    in_experiment(TASK, ("success", "liftd"), 0.1, "did you mean 'lifted'"),
+    in_experiment(TASK, ("success", "liftd"), 0.1, "'liftd' is unknown; allowed: lifted, "),
     in_experiment(TASK, ("metrics",), ["sucess"], "did you mean 'success'"),
     in_experiment(TASK, ("mode",), "tasks", "did you mean 'task'"),
     in_experiment(TASK, ("compare",), "planer", "did you mean 'planner'"),
