@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
+from modular_framework_simulation.loop.world_record import WorldRecord
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import read_model_text
@@ -43,13 +44,17 @@ def height(world: PhysicsWorld, name: str) -> float:
 
 def furnish(world: PhysicsWorld) -> None:
     """Adds a table with a stack of two cubes, a cube on the floor, and a wheel that turns far from them."""
+    place(world)
+    run(world, LONG_S)
+
+
+def place(world: PhysicsWorld) -> None:
     world.spawn(solid("table", specs.Box((1, 1, 0.1)), Pose((0, 0, 0.5)), static=True))
     world.spawn(solid("cube", CUBE, Pose((0, 0, TOP_M)), mass=MASS_KG))
     world.spawn(solid("upper", CUBE, Pose((0, 0, TOP_M + 0.05)), mass=MASS_KG))
     world.spawn(solid("lone", CUBE, Pose((0, 2, 0.025)), mass=MASS_KG))
     world.spawn(read_model_text(WHEEL, "text", Resources()))
     set_joint(world, PartName("wheel", "axle"), JointChange(None, None, JointSettings(None, 1.0, 5.0)))
-    run(world, LONG_S)
 
 
 @pytest.fixture(autouse=True)
@@ -170,3 +175,20 @@ def test_runs_with_stored_bodies_are_equal_bit_for_bit(make_world: MakeWorld) ->
         run(world, 1.0)
         ends.append(exact_state(world))
     assert ends[0] == ends[1]
+
+
+def test_the_record_of_the_world_keeps_the_contacts_of_stored_bodies_and_leaves_them_stored(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world()
+    record = WorldRecord(world, lambda: ())
+    place(world)
+    record.start()
+    for _ in range(round(LONG_S / 0.02)):
+        run(world, 0.02)
+        record.sample()
+    assert bodies_in_engine(world) == 3
+    samples = record.stop()["samples"]
+    contacts = [sample[2] for sample in samples if sample[2] is not None][-1]
+    assert {("cube", "table"), ("cube", "upper")} <= set(contacts)
+    assert bodies_in_engine(world) == 3

@@ -34,7 +34,7 @@ class WorldRecord:
         self._known: set[str] = set()
         self._revision = -1
         self._touched: dict[str, set[str]] = {}
-        self._contacts: list[tuple[str, str]] | None = None
+        self._contacts: list[tuple[str, ...]] | None = None
         self._held: list[str] | None = None
 
     def start(self) -> None:
@@ -72,15 +72,16 @@ class WorldRecord:
         states: dict[str, Any] = {}
         requested = world.revision != self._revision  # a request may also move a static model
         self._revision = world.revision
-        changed = set(world.bodies) if requested else world.moving()
-        if requested:
-            states |= {name: None for name in self._known - changed}
-            self._known = set(world.bodies)
-        for name in changed:
+        moving, present = world.moving(), set(world.bodies)
+        states |= {name: None for name in self._known - present}
+        for name in present if requested else moving:
             body = world.bodies[name]
             if requested or not body.static:
                 states[name] = self._state(body)
-        contacts, held = self._update_contacts(changed, states), sorted(self._held_now())
+        self._update_contacts(moving | present - self._known, self._known - present)
+        pairs = {tuple(sorted((name, other))) for name, others in self._touched.items() for other in others}
+        contacts, held = sorted(pairs), sorted(self._held_now())
+        self._known = present
         self._samples.append(
             [
                 world.time_ns * 1e-9,
@@ -103,15 +104,13 @@ class WorldRecord:
                 states = self._world.engine.joint_states(part.number, list(part.joint_indices.values()))
                 yield from zip(part.joint_indices, (state.position for state in states), strict=True)
 
-    def _update_contacts(self, changed: Iterable[str], states: Iterable[str]) -> list[tuple[str, str]]:
-        """Returns the pairs of models that press on each other; resting models keep their contacts."""
-        for name in {*changed, *states}:
+    def _update_contacts(self, moving: Iterable[str], gone: Iterable[str]) -> None:
+        """Updates the models that each model presses on; resting models keep their contacts."""
+        for name in (*moving, *gone):
             self._touched.pop(name, None)
             for others in self._touched.values():
                 others.discard(name)
-        for name in changed:
+        for name in moving:
             body = self._world.bodies[name]
             if not body.static or body.spec is None:
                 self._touched[name] = self._world.touched(body)
-        pairs = {tuple(sorted((name, other))) for name, others in self._touched.items() for other in others}
-        return sorted(pairs)  # type: ignore[arg-type]  # each pair has two names

@@ -351,7 +351,10 @@ class PhysicsEngine(ABC):
 
     @abstractmethod
     def touched(self, number: int) -> set[int]:
-        """Returns the ids of the bodies that any link of a body pressed on in the last step."""
+        """Returns the ids of the bodies that any link of a body pressed on in the last step.
+
+        The contacts of a sleeping body may be unknown; its neighbours stay asleep.
+        """
 
     @abstractmethod
     def contact_points(self, number: int, index: int) -> list[EngineContact]:

@@ -482,9 +482,11 @@ class PyBulletEngine(PhysicsEngine):
         return [touch for touch in touches if touch.other != number]
 
     def touched(self, number: int) -> set[int]:
-        """Returns the bodies that a body presses on."""
-        points = self.api.getContactPoints(bodyA=number, physicsClientId=self.client)
-        return {point[2] for point in points if point[9] > 0.0 and point[2] != number}
+        """Returns the bodies that a body presses on; none for a stored body."""
+        if number in self._store.stored:
+            return set()
+        points = self.api.getContactPoints(bodyA=self._id(number), physicsClientId=self.client)
+        return {self._store.number(point[2]) for point in points if point[9] > 0.0} - {number}
 
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link, with forces."""
