@@ -29,6 +29,9 @@ CAUSES = (
     "the object slipped 0.08 m while it was lifted",
     "joint 'wrist' left its path by 0.21 rad",
 )
+CLASSES = ("unreachable", "no plan", "slipped", "collision in execution")
+"""Class of each cause."""
+MILESTONES = ("grasped", "lifted", "moved", "released", "placed")
 TEXT = """# Compares planners on two objects.
 experiment: planners_on_two_objects
 task: pick_and_place
@@ -137,6 +140,7 @@ class ReportedExperiment:
         with_spans: Whether states and components are recorded.
         with_files: Whether failed episodes have files.
         finished: How many episodes are finished; None: all.
+        with_progress: Whether episodes have milestones, and failed ones a class.
     """
 
     trials: int = 50
@@ -152,6 +156,7 @@ class ReportedExperiment:
     with_spans: bool = True
     with_files: bool = True
     finished: int | None = None
+    with_progress: bool = False
 
     @property
     def planned(self) -> int:
@@ -235,7 +240,8 @@ class ReportedExperiment:
             spec, status, outcome="success" if success else "fail", cause=cause, begun=begun, wall_s=wall_s,
             simulated_s=values["task_time"], metrics=values,
             spans=self._spans(spec, status, cause, float(values["planning_time"] or 1.0)) if self.with_spans else (),
-            snapshot=snapshot_of(spec),
+            snapshot=snapshot_of(spec)
+            | ({"failure_class": CLASSES[self.causes.index(cause)]} if self.with_progress and cause else {}),
             folder=f"{self.name}_files/{spec.number:06d}", worker=f"worker-{spec.number % 2}",
         )  # fmt: skip
 
@@ -268,4 +274,10 @@ class ReportedExperiment:
             if name in component:
                 spans.append(Span("component", component[name], now + 0.05 * length, ended, outcome, failed=failed))
             now += length
+        if self.with_progress:
+            reached = count if status is EpisodeStatus.SUCCEEDED else count - 1
+            spans += [
+                Span("milestone", name, 0.5, 1.0 + index if index < reached else None, failed=index >= reached)
+                for index, name in enumerate(MILESTONES)
+            ]
         return tuple(spans)

@@ -108,7 +108,7 @@ wrist: {frame_id: lens, data_topics: {rgb_topic: a, depth_map_topic: b, pointclo
     assert f"camera 'wrist' in bags at most (320 x 240 at 5 Hz) {size_text(3 * 50 * image_bytes)}" in text
     assert text.startswith("  disk: about 279 MB for 3 episodes, each 10 s of simulated time")
     without = disk_text([EpisodeSpec(0, {}, 0, 1, replace(settings, record=RecordedFiles()))])
-    assert "wrist" not in without and "disk: about 580 kB for 1 episodes" in without
+    assert "wrist" not in without and "disk: about 710 kB for 1 episodes" in without
 
 
 @pytest.mark.parametrize(

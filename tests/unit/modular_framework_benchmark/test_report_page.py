@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from lxml import html
 from report_pages import Loads, Page, drawn_page
-from reported_experiment import TEXT, ReportedExperiment
+from reported_experiment import MILESTONES, TEXT, ReportedExperiment
 
 from modular_framework_benchmark.commands.report_command import main
 from modular_framework_benchmark.records.episode import EpisodeStatus
@@ -154,6 +154,38 @@ def test_a_timeline_says_that_its_episode_started_cold() -> None:
     assert figure is not None
     labels = figure.figure.layout.yaxis.ticktext
     assert "cold start" in labels[0] and "cold" not in labels[1]
+
+
+def test_failures_have_classes_by_method_that_lead_to_the_files_of_their_episodes(tmp_path: Path) -> None:
+    experiment = replace(SMALL, with_progress=True)
+    page = Page.of(experiment.store(tmp_path / "results.db"), tmp_path / "report.html")
+    records = [record for record in experiment.records() if not record.succeeded]
+    expected: dict[str, dict[str, int]] = {}
+    for record in records:
+        of_class = expected.setdefault(record.snapshot["failure_class"], {})
+        method = record.spec.configuration["motion_planner"]
+        of_class[method] = of_class.get(method, 0) + 1
+    assert page.claims["failures"]["classes"] == expected
+    assert {group["failure_class"] for group in page.claims["failures"]["groups"]} == set(expected)
+    summaries = [element.text_content().strip() for element in page.tree.xpath("//details/summary")]
+    assert any(text.startswith("slipped: the object slipped") for text in summaries)
+    assert page.tree.xpath("//details[summary/strong='slipped']//a[contains(@href, 'episode.log')]")
+
+
+def test_the_report_shows_how_many_episodes_of_each_method_reached_each_milestone(tmp_path: Path) -> None:
+    experiment = replace(SMALL, with_progress=True)
+    page = Page.of(experiment.store(tmp_path / "results.db"), tmp_path / "report.html")
+    for trace in page.figures()["milestones"]["data"]:
+        records = [each for each in experiment.records() if each.spec.configuration["motion_planner"] == trace["name"]]
+        reached = [
+            sum(span.name == name and not span.failed for each in records for span in each.spans) for name in MILESTONES
+        ]
+        assert list(trace["x"]) == list(MILESTONES) and list(trace["customdata"]) == reached
+        assert list(trace["y"]) == pytest.approx([100.0 * number / len(records) for number in reached])
+
+
+def test_an_experiment_without_milestones_has_no_figure_of_them(page: Page) -> None:
+    assert "milestones" not in page.figures() and "Failures by cause" in page.words
 
 
 def test_failures_are_grouped_by_cause_most_frequent_first(page: Page) -> None:

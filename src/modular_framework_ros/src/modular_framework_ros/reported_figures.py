@@ -60,6 +60,13 @@ SEARCH_TIME = Figure(
 )
 CLEARANCE = Figure("clearance_m", "planning", "m", "Smallest distance along the motion.", source=Source.MEASURED)
 ATTEMPTS = Figure("attempts", "planning", "", "Searches that the planner started.", source=Source.MEASURED)
+ERROR_CODE = Figure(
+    "error_code",
+    "planning",
+    "",
+    "Result as a code of moveit_msgs/MoveItErrorCodes; 1 is success.",
+    source=Source.MEASURED,
+)
 SOLVED_SHARE = Figure("solved_share", "kinematics", "", "Fraction of the poses solved.", source=Source.MEASURED)
 SOLVING_TIME = Figure("solving_time_s", "kinematics", "s", "Median time per pose.", Clock.WALL, Source.MEASURED)
 SOLUTIONS = Figure("solutions", "kinematics", "", "Mean number of solutions per pose.", source=Source.MEASURED)

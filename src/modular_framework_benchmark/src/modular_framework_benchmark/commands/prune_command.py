@@ -21,7 +21,14 @@ KINDS = {
     "bag": ("episode.bag", "bag.txt"),
     "video": ("video.mp4",),
     "log": ("log.txt",),
-    "recording": ("trajectory.parquet", "tracking.parquet", "recording.json", "parameters.json", "task_records"),
+    "recording": (
+        "trajectory.parquet",
+        "tracking.parquet",
+        "recording.json",
+        "world.json",
+        "parameters.json",
+        "task_records",
+    ),
 }
 """Files of an episode, keyed by the values of `--files`."""
 EVERYTHING = "all"

@@ -13,6 +13,7 @@ from typing import Any
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
 from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.metrics.failure_classes import failure_class
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
     objects_of,
@@ -28,7 +29,7 @@ from modular_framework_benchmark.predicates.progress import Progress, progress_o
 from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.episode_settings import as_json
-from modular_framework_benchmark.records.results import COLD_START
+from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
 TASK_RECORDS = "task_records"
@@ -134,6 +135,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         folder=end.folder,
     )
     measured = measure(end.spec.settings.metrics, measurements)
+    failure = failure_class(measurements, bool(answer.get("task_succeeded")))
     invalid = end.status is EpisodeStatus.INVALID
     spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording), *_milestone_spans(progress))
     return EpisodeRecord(
@@ -146,7 +148,9 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         simulated_s=answer.get("simulated_s"),
         metrics={name: None if invalid else value for name, value in measured.values.items()},
         spans=tuple(sorted(spans, key=lambda span: span.started_s)),
-        snapshot=_snapshot(end, measured.faults) | software.as_json(),
+        snapshot=_snapshot(end, measured.faults)
+        | software.as_json()
+        | ({FAILURE_CLASS: failure.value} if failure is not None else {}),
         folder=str(end.folder),
     )
 

@@ -28,6 +28,7 @@ from modular_framework_ros.reported_figures import (
     ATTEMPTS,
     CLEARANCE,
     CONCURRENT,
+    ERROR_CODE,
     PLANNING_TIME,
     PROCESSOR_TIME,
 )
@@ -248,7 +249,7 @@ def _planning(samples: Samples, origin_s: float) -> list[dict[str, Any]]:
         concurrent_plans = sum(begin < wall and end > wall - wall_s for begin, end in spans)
         figures = {PLANNING_TIME.name: wall_s, CONCURRENT.name: max(concurrent_plans, 1)} | {
             figure.name: report[figure.name]
-            for figure in (CLEARANCE, ATTEMPTS, PROCESSOR_TIME)
+            for figure in (CLEARANCE, ATTEMPTS, PROCESSOR_TIME, ERROR_CODE)
             if isinstance(report.get(figure.name), int | float)
         }
         times_s = (report.get("started", report["time"]) - origin_s, report["time"] - origin_s)

@@ -16,8 +16,9 @@ from modular_framework_simulation.sensors.cameras import POINT, Camera
 
 SIMULATED_S = 10.0
 """Length of the shipped pick [s of simulated time], on which the following sizes were measured."""
-TEXT_BYTES, MOTION_BYTES_PER_S = 230e3, 34e3
-"""Log, parameters and reports of an episode [B]; samples of 10 joints [B/s]. Both grow with the robot."""
+TEXT_BYTES, MOTION_BYTES_PER_S = 230e3, 47e3
+"""Log, parameters and reports of an episode [B]; samples of 10 joints and the record of the world [B/s]. Both grow with
+the robot."""
 BAG_BYTES_PER_S, VIDEO_BYTES_PER_S = 0.4e6, 6e3
 DATABASE_BYTES, PLAN_BYTES = 10e3, 20e3
 """An episode in the database; the motion of a plan in the mode `planning` [B]."""

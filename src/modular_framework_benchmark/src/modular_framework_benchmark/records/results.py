@@ -12,6 +12,9 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 COLD_START = "cold_start"
 """Snapshot part and column that marks the first episode of a stack."""
 
+FAILURE_CLASS = "failure_class"
+"""Snapshot part and column with the class of a failed episode."""
+
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResults:
@@ -24,7 +27,7 @@ class ExperimentResults:
             `worker`; a column named after each factor with the labels of the levels; a column named after each metric
             (float, NaN without a value; 0 and 1 for a rate); in the mode `planning` also `drawn_problem`, a text that
             identifies the problem. `cold_start` (bool) marks the first episode of a stack; without the column, no
-            episode is marked.
+            episode is marked. `failure_class` is the class of a failed episode in the mode `task`, otherwise "".
         spans: A row per span, with the columns `number` (of the episode), `kind`, `name`, `started_s`, `ended_s`,
             `outcome`, `failed`, `reason`.
         planned: Total number of episodes, finished or not.

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 
-from modular_framework_benchmark.records.results import COLD_START
+from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 
 
 class PartKind(Enum):
@@ -33,7 +33,7 @@ _PARTS: Mapping[PartKind, tuple[str, ...]] = {
         *("metric_faults", "earlier_tries", REFERENCE),
         *("load_before", "load_after", "stolen_s", "busy_s", "others_share"),
     ),
-    PartKind.VARYING: ("seed", "parameters", "final_objects", "world_digest", COLD_START),
+    PartKind.VARYING: ("seed", "parameters", "final_objects", "world_digest", COLD_START, FAILURE_CLASS),
 }
 SNAPSHOT_PARTS = {name: kind for kind, names in _PARTS.items() for name in names}
 """Kind of each part, by name."""

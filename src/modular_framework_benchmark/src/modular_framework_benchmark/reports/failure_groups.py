@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -14,7 +14,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import FAILURE_CLASS, ExperimentResults
 from modular_framework_benchmark.reports.figure_style import NamedFigure, color_of, label, stacked_bars, unique_labels
 from modular_framework_benchmark.reports.number_text import counted
 
@@ -59,9 +59,10 @@ class FailedEpisode:
 
 @dataclass(frozen=True, slots=True)
 class FailureGroup:
-    """Episodes with the same cause, except for numbers in its text.
+    """Episodes of the same class with the same cause, except for numbers in its text.
 
     Attributes:
+        failure_class: Class of the failures; "" without classes.
         cause: Cause; `…` replaces numbers that differ between episodes.
         status: Final status of these episodes.
         episodes: Number of episodes.
@@ -69,6 +70,7 @@ class FailureGroup:
         by_method: Number of episodes, keyed by method.
     """
 
+    failure_class: str
     cause: str
     status: EpisodeStatus
     episodes: int
@@ -87,11 +89,14 @@ class Failures:
     """Failures of an experiment.
 
     Attributes:
+        classes: Numbers of episodes by method of each class, the most frequent class first; of each cause without
+            classes.
         groups: Most frequent causes, at most MOST_GROUPS.
         causes: Number of causes.
         episodes: Number of unsuccessful episodes.
     """
 
+    classes: Mapping[str, Mapping[str, int]]
     groups: tuple[FailureGroup, ...]
     causes: int
     episodes: int
@@ -107,15 +112,28 @@ def group_failures(results: ExperimentResults, database_folder: Path, report_fol
     """
     table = results.episodes[results.episodes["status"] != EpisodeStatus.SUCCEEDED.value]
     causes = {text: _NUMBER.sub("…", text) for text in table["cause"].astype(str).unique()}
-    keyed = table.assign(group=table["cause"].astype(str).map(causes))
-    groups = list(keyed.groupby(["status", "group"], sort=False))
+    classes = table[FAILURE_CLASS].astype(str) if FAILURE_CLASS in table else ""
+    keyed = table.assign(group=table["cause"].astype(str).map(causes), **{FAILURE_CLASS: classes})
+    groups = list(keyed.groupby([FAILURE_CLASS, "status", "group"], sort=False))
     groups.sort(key=lambda item: -len(item[1]))
     finder = _EpisodeReader(results, database_folder, report_folder)
+    found = tuple(finder.group(keys, rows) for keys, rows in groups)
     return Failures(
-        tuple(finder.group(EpisodeStatus(str(key[0])), str(key[1]), rows) for key, rows in groups[:MAX_GROUPS]),
+        _by_class(found),
+        found[:MAX_GROUPS],
         len(groups),
         len(table),
     )
+
+
+def _by_class(groups: Sequence[FailureGroup]) -> dict[str, dict[str, int]]:
+    """Returns the numbers of episodes by method, keyed by class or cause, the most frequent first."""
+    counts: dict[str, dict[str, int]] = {}
+    for group in groups:
+        of_class = counts.setdefault(group.failure_class or group.cause, {})
+        for method, number in group.by_method.items():
+            of_class[method] = of_class.get(method, 0) + number
+    return dict(sorted(counts.items(), key=lambda item: -sum(item[1].values())))
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +142,15 @@ class _EpisodeReader:
     database_folder: Path
     report_folder: Path
 
-    def group(self, status: EpisodeStatus, pattern: str, rows: pd.DataFrame) -> FailureGroup:
+    def group(self, keys: tuple[object, ...], rows: pd.DataFrame) -> FailureGroup:
+        failure_class, status, pattern = map(str, keys)
         compared = self.results.description.compared
         counts = rows[compared].astype(str).value_counts()
         causes = rows["cause"].astype(str).unique()
         return FailureGroup(
+            failure_class,
             (str(causes[0]) if len(causes) == 1 else pattern) or "no cause was recorded",
-            status,
+            EpisodeStatus(status),
             len(rows),
             tuple(self.episode(row) for row in rows.head(MAX_EPISODES).to_dict("records")),
             {str(method): int(count) for method, count in counts.items()},
@@ -175,24 +195,24 @@ def _relative(path: Path, report_folder: Path) -> str:
 
 
 def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure | None:
-    """Returns a bar chart of the most frequent causes by method, or None without failures."""
-    if not failures.groups:
+    """Returns a bar chart of the classes of failures by method, or None without failures; of causes without classes."""
+    if not failures.classes:
         return None
-    groups = failures.groups[:MAX_BARS]
-    names = unique_labels([group.cause for group in groups], 64)
+    shown = dict(list(failures.classes.items())[:MAX_BARS])
+    names = unique_labels(list(shown), 64)
     figure = go.Figure(
         [
             go.Bar(
-                x=[group.by_method.get(method, 0) for group in groups], y=names, orientation="h", width=0.6,
+                x=[counts.get(method, 0) for counts in shown.values()], y=names, orientation="h", width=0.6,
                 name=label(method), marker={"color": color_of(index), "opacity": 0.85},
                 hovertemplate=f"{label(method)}: %{{x:,}}<extra></extra>",
             )
             for index, method in enumerate(methods)
         ]
     )  # fmt: skip
-    stacked_bars(figure, height=130 + 34 * len(groups), value_title="episodes")
-    summary = (
-        f"Unsuccessful episodes by cause and method: the {len(groups)} most frequent of "
-        f"{counted(failures.causes, 'cause')}."
-    )
-    return NamedFigure("failures", "Failures by cause", summary, figure)
+    stacked_bars(figure, height=130 + 34 * len(shown), value_title="episodes")
+    noun = "class" if failures.groups[0].failure_class else "cause"
+    summary = f"Unsuccessful episodes by {noun} and method."
+    if len(failures.classes) > len(shown):
+        summary = f"{summary[:-1]}: the {len(shown)} most frequent of {counted(len(failures.classes), noun)}."
+    return NamedFigure("failures", f"Failures by {noun}", summary, figure)

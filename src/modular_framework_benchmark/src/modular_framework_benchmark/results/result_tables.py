@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Select, case, column, func, select, table
 
 from modular_framework_benchmark.experiments.modes import MODES, stored_settings
 from modular_framework_benchmark.records.experiment import ExperimentDescription
-from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS, ExperimentResults
 from modular_framework_benchmark.results.columns import SUCCESS
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
@@ -73,7 +73,9 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
     if "settings" in columns:
         problems = [stored_settings(description.mode, json.loads(text)).drawn_problem for text in columns["settings"]]
         frame["drawn_problem"] = pd.Series(problems, dtype="str")
-    frame[COLD_START] = frame["number"].isin(_flagged_episodes(connection, number, COLD_START))
+    frame[COLD_START] = frame["number"].isin(_snapshot_parts(connection, number, COLD_START))
+    failures = _snapshot_parts(connection, number, FAILURE_CLASS)
+    frame[FAILURE_CLASS] = pd.Series([failures.get(each, "") for each in columns["number"]], dtype="str")
     return pd.DataFrame(frame)
 
 
@@ -202,8 +204,8 @@ def _combination_text(configuration: str) -> str:
     return ", ".join(f"{name}={level}" for name, level in sorted(json.loads(configuration).items()))
 
 
-def _flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
-    """Returns the numbers of the episodes in whose snapshots a part is true.
+def _snapshot_parts(connection: Connection, number: int, name: str) -> dict[int, Any]:
+    """Returns a part of the episodes' snapshots, keyed by the number of the episode; episodes without it are left out.
 
     Args:
         connection: Connection to the database.
@@ -211,16 +213,17 @@ def _flagged_episodes(connection: Connection, number: int, name: str) -> frozens
         name: Name of the part.
     """
     columns = SNAPSHOT_VALUES.c
-    found = connection.execute(select(columns.id).where(columns.name == name, columns.value == json.dumps(True)))
-    true = set(found.scalars())
-    if not true:
-        return frozenset()
+    found = connection.execute(select(columns.id, columns.value).where(columns.name == name))
+    values = {row.id: json.loads(row.value) for row in found}
+    if not values:
+        return {}
     rows = connection.execute(
         select(EPISODES.c.number, RECORDS.c.snapshot)
         .join_from(EPISODES, RECORDS, RECORDS.c.runid == EPISODES.c.id)
         .where(EPISODES.c.descriptionid == number)
     )
-    return frozenset(row.number for row in rows if json.loads(row.snapshot).get(name) in true)
+    parts = {row.number: json.loads(row.snapshot).get(name) for row in rows}
+    return {episode: values[part] for episode, part in parts.items() if part in values}
 
 
 def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, Any]:

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Class of a failed episode, from its end, the reports of its components and the true states of its world."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
+from modular_framework_benchmark.predicates.world_track import Floats, WorldTrack
+from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, REACHABLE
+
+SLIP_HEIGHT_M = 0.05
+"""Height above its start up to which a lost object has slipped; from higher, it was dropped [m]."""
+RELEASE_S = 1.0
+"""Time after the start of a gripper motion within which the loss of an object is its release [s]; the simulation
+notices a loss after 0.3 s."""
+AFTER_GENERATION = ("planning", "execution", "grasp")
+"""Components that a task uses once it has a grasp."""
+NO_IK_SOLUTION = -31
+"""Error code of moveit_msgs/MoveItErrorCodes for a pose that the arm cannot reach."""
+
+
+class FailureClass(Enum):
+    """Class of a failed episode."""
+
+    NO_CANDIDATE = "no candidate"  # the method found no grasp
+    UNREACHABLE = "unreachable"  # no grasp or goal that the arm can reach
+    NO_PLAN = "no plan"  # the last failure of the task was a plan
+    COLLISION = "collision in execution"  # a motion was not completed
+    GRASP_MISSED = "grasp missed"  # the gripper closed, and never held the object
+    SLIPPED = "slipped"  # the gripper lost the object near its start
+    DROPPED = "dropped"  # the gripper lost the object higher above its start
+    MISPLACED = "misplaced"  # the object is not where it should be, or not as it should be
+    TIMEOUT = "timeout"
+    DIED = "component died"
+    INVALID = "invalid"
+
+
+_OF_STATUS = {
+    EpisodeStatus.INVALID: FailureClass.INVALID,
+    EpisodeStatus.BROKEN: FailureClass.DIED,
+    EpisodeStatus.TIMED_OUT: FailureClass.TIMEOUT,
+}
+
+
+def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> FailureClass | None:
+    """Returns the class of an episode; None for a success.
+
+    The class is what ended the attempt: the loss of a held object unless the gripper opened on purpose, otherwise the
+    last failure of a component, otherwise what the world shows.
+
+    Args:
+        episode: Measurements of the episode.
+        task_succeeded: Whether the task itself ended with success.
+    """
+    if episode.status is EpisodeStatus.SUCCEEDED:
+        return None
+    if episode.status in _OF_STATUS:
+        return _OF_STATUS[episode.status]
+    grasps = [report for report in episode.reports if report.component == "grasp"]
+    lost_m = _loss_height(episode.world, episode.target, np.array([report.started_s for report in grasps]))
+    if lost_m is not None:
+        return FailureClass.SLIPPED if lost_m <= SLIP_HEIGHT_M else FailureClass.DROPPED
+    failed = [report for report in episode.reports if not report.succeeded or _is_empty(report)]
+    if not task_succeeded and failed:
+        return _of_component(max(failed, key=lambda report: report.ended_s))
+    if not task_succeeded and not any(report.component in AFTER_GENERATION for report in episode.reports):
+        return FailureClass.NO_CANDIDATE
+    held = episode.world is not None and bool(episode.world.holds(episode.target).any())
+    return FailureClass.GRASP_MISSED if grasps and episode.target and not held else FailureClass.MISPLACED
+
+
+def _of_component(report: ComponentReport) -> FailureClass:
+    if report.component == "generation":
+        reachable = report.figures.get(REACHABLE)
+        return FailureClass.UNREACHABLE if reachable == 0.0 and _found_any(report) else FailureClass.NO_CANDIDATE
+    if report.component == "planning":
+        out_of_reach = report.figures.get(ERROR_CODE) == NO_IK_SOLUTION
+        return FailureClass.UNREACHABLE if out_of_reach else FailureClass.NO_PLAN
+    return FailureClass.GRASP_MISSED if report.component == "grasp" else FailureClass.COLLISION
+
+
+def _is_empty(report: ComponentReport) -> bool:
+    """Returns whether a generation found no grasp that the arm can reach."""
+    return 0.0 in (report.figures.get(CANDIDATES), report.figures.get(REACHABLE))
+
+
+def _found_any(report: ComponentReport) -> bool:
+    return report.figures.get(CANDIDATES) != 0.0
+
+
+def _loss_height(world: WorldTrack | None, target: str, gripper_motions_s: Floats) -> float | None:
+    """Returns the height above its start at which the gripper lost an object for good [m]; None if it did not.
+
+    Args:
+        world: True states of the world.
+        target: Name of the object.
+        gripper_motions_s: Starts of the gripper's motions [s since the start of the recording].
+    """
+    held = world.holds(target) if world is not None else np.zeros(1, dtype=bool)
+    if world is None or not held.any() or held[-1]:
+        return None
+    last = int(np.flatnonzero(held)[-1])
+    since_motion_s = world.times_s[last] - gripper_motions_s
+    if np.any((since_motion_s >= 0.0) & (since_motion_s <= RELEASE_S)):
+        return None
+    heights = world.bodies[target].positions[:, 2]
+    return float(heights[last] - heights[0])
