@@ -11,7 +11,7 @@ import yaml
 from experiment_texts import PICK, FakeResources, faults_of, read
 
 from modular_framework_benchmark.experiments.experiment import StoppingKind
-from modular_framework_benchmark.experiments.experiment_file import load_experiment
+from modular_framework_benchmark.experiments.experiment_file import load_experiment, read_experiment
 from modular_framework_benchmark.experiments.metric_choices import read_metrics
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.metrics.registry import METRICS
@@ -101,6 +101,22 @@ success:
         Milestone(name="lifted", predicate=Lifted(object="ball_1", height=0.2), weight=2.0),
     )
     assert found["cube"].progress[0].predicate == HeldFor(object="cube_1")
+
+
+def test_progress_is_measured_only_with_milestones(tmp_path: Path) -> None:
+    known = {"task": {name: entry.metric for name, entry in METRICS.items()}}
+
+    def names(text: str) -> list[str]:
+        resources = FakeResources(tmp_path / "models")
+        return [
+            metric.name for metric in read_experiment(text, tmp_path / "a.yaml", resources, known).description.metrics
+        ]
+
+    every = PICK.replace("metrics: [success, task_time]\n", "")
+    assert "progress" not in names(every) and "progress" in names(f"{every}\n{PROGRESS}\n")
+    assert "progress" in names(f"{PICK.replace('[success, task_time]', '[success, progress]')}\n{PROGRESS}\n")
+    with pytest.raises(ExperimentFault, match="the metric 'progress' needs milestones; list them in the key progress"):
+        names(PICK.replace("[success, task_time]", "[success, progress]"))
 
 
 def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:

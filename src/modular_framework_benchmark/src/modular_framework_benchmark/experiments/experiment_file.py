@@ -39,6 +39,8 @@ OPTIONAL = (
     "record",
 )  # fmt: skip
 KEYS = (*REQUIRED, *OPTIONAL)
+PROGRESS = "progress"
+"""Name of the metric of milestones, and of their key."""
 MAX_EPISODES = 10_000_000
 
 SettingChecks = Map[str, SettingsCheck]
@@ -261,7 +263,15 @@ class _Reader:
             return (), ()
         budgets = {one.settings.budget_s for one in combinations}
         budget_s = budgets.pop() if len(budgets) == 1 else None
-        return read_metrics(self._root.entries.get("metrics"), self._known.get(self._mode, {}), budget_s, self._reading)
+        node, known = self._root.entries.get("metrics"), dict(self._known.get(self._mode, {}))
+        has_progress = not combinations or any(one.settings.has_milestones for one in combinations)
+        if node is None and not has_progress:
+            known.pop(PROGRESS, None)
+        metrics, metric_specs = read_metrics(node, known, budget_s, self._reading)
+        if node is not None and not has_progress and PROGRESS in metric_specs:
+            text = f"the metric '{PROGRESS}' needs milestones; list them in the key {PROGRESS}"
+            self._reading.faults.add(node.location, text)
+        return metrics, metric_specs
 
     def _note_metric_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:
         node = self._root.entries.get("metrics")

@@ -146,6 +146,11 @@ class TaskSettings(EpisodeSettings):
         return self.success.object or self.objects[0].name
 
     @property
+    def has_milestones(self) -> bool:
+        """Returns whether the episode has milestones."""
+        return bool(self.progress)
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Returns the task script."""
         return (Path(self.task),) if self.task else ()

@@ -87,10 +87,10 @@ def _timed(
 
 _ALL = (
     _registered(task.success, _RATE, _HIGHER),
-    _registered(task.progress, MetricKind.PARTIAL_CREDIT, _HIGHER, bounds=_FRACTION),
     _timed(task.task_time, _LOWER, _SIMULATED),
     _timed(task.task_wall_time, _LOWER, _WALL),
     _registered(task.failed_states, _COUNT, _LOWER),
+    _registered(task.progress, MetricKind.PARTIAL_CREDIT, _HIGHER, bounds=_FRACTION),
     _timed(generation.generation_time, _LOWER, _WALL),
     _timed(generation.method_processor_time, _LOWER, Clock.PROCESSOR),
     _registered(generation.generation_success, _RATE, _HIGHER, source=_SAID),

@@ -106,6 +106,11 @@ class EpisodeSettings:
         return ""
 
     @property
+    def has_milestones(self) -> bool:
+        """Returns whether the episode has milestones, which give it a progress."""
+        return False
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Returns the named files whose content determines the episode, without scene and problem."""
         return ()
