@@ -25,7 +25,8 @@ class Motors(RobotHW):
     def init(self, root_nh, robot_hw_nh):
         self._transmissions = RobotTransmissions(self, root_nh, ["m1", "m2", "m3"])
         self._guard = JointLimitGuard(self, root_nh)
-        self._transmissions.actuators["m3"].position = 20.0
+        for name, position in {"m1": 0.0, "m2": 0.0, "m3": 20.0}.items():
+            self._transmissions.actuators[name].position = position
         return True
 
     def read(self, time_s, period_s):
