@@ -723,7 +723,7 @@ def test_no_number_and_no_name_does_harm(simulation: Any, number: float, text: s
 def test_the_node_has_everything_of_gazebo_ros_and_the_table_leaves_nothing_out(simulation: Any) -> None:
     published, subscribed, services = rosgraph.Master("/test").getSystemState()
     own = {name for name, nodes in services if "/gazebo" in nodes}
-    additions = {"hold_time", "advance_time", "step_time", "restart", "referee"}
+    additions = {"hold_time", "advance_time", "step_time", "restart", "referee", "record_world"}
     assert own == {f"/gazebo/{name}" for name in (*SERVICES, *additions)}
     topics = {name for name, nodes in (*published, *subscribed) if "/gazebo" in nodes and name.startswith("/gazebo/")}
     own_topics = ("grasped_object", "visible_models", "visible_poses")
