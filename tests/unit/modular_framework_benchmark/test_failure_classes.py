@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from predicate_worlds import STANDING_M, sample, stage_of, state
 
@@ -60,7 +61,7 @@ def test_how_an_episode_ended_comes_first(status: EpisodeStatus, expected: Failu
         (report("generation", 2.0, figures={CANDIDATES: 24.0, REACHABLE: 0.0}), FailureClass.UNREACHABLE),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -31.0}), FailureClass.UNREACHABLE),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -1.0}), FailureClass.NO_PLAN),
-        (report("execution", 2.0, succeeded=False), FailureClass.COLLISION),
+        (report("execution", 2.0, succeeded=False), FailureClass.MOTION),
         (report("grasp", 2.0, succeeded=False), FailureClass.GRASP_MISSED),
     ],
 )
@@ -70,6 +71,27 @@ def test_the_last_component_that_failed_decides_about_a_task_that_failed(
     reports = (report("planning", 1.0, succeeded=False), last, report("execution", 3.0))
     for track in (None, world(None)):
         assert failure_class(replace(FAILED, reports=reports, world=track), task_succeeded=False) is expected
+
+
+@pytest.mark.parametrize(
+    ("contacts", "expected"),
+    [
+        ({("arm", "shelf"): (1.8, 2.0)}, FailureClass.COLLISION),
+        ({("arm", "shelf"): (2.5, 3.0)}, FailureClass.MOTION),  # after the motion
+        ({("arm", "pedestal"): (0.0, 3.0)}, FailureClass.MOTION),  # on which it stands
+        ({("arm", "cube"): (1.8, 2.0)}, FailureClass.MOTION),  # the target
+        ({("cube", "shelf"): (1.8, 2.0)}, FailureClass.MOTION),  # not the robot
+    ],
+)
+def test_a_motion_that_was_not_completed_is_a_collision_if_the_robot_touched_something_else(
+    contacts: dict[tuple[str, str], tuple[float, float]], expected: FailureClass
+) -> None:
+    track = world(None)
+    times_s = np.linspace(0.0, 10.0, 101)
+    flags = {frozenset(pair): (times_s >= low) & (times_s <= high) for pair, (low, high) in contacts.items()}
+    track = replace(track, times_s=times_s, contacts=flags, robots=frozenset({"arm"}))
+    reports = (report("execution", 2.0, succeeded=False),)  # from 1.6 s on
+    assert failure_class(replace(FAILED, reports=reports, world=track), task_succeeded=False) is expected
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,8 @@ class FailureClass(Enum):
     NO_CANDIDATE = "no candidate"  # the method found no grasp
     UNREACHABLE = "unreachable"  # no grasp or goal that the arm can reach
     NO_PLAN = "no plan"  # the last failure of the task was a plan
-    COLLISION = "collision in execution"  # a motion was not completed
+    COLLISION = "collision in execution"  # a motion was not completed, and the robot touched something else
+    MOTION = "motion not completed"  # a motion was not completed, without a contact in the record
     GRASP_MISSED = "grasp missed"  # the gripper closed, and never held the object
     SLIPPED = "slipped"  # the gripper lost the object near its start
     DROPPED = "dropped"  # the gripper lost the object higher above its start
@@ -66,21 +67,36 @@ def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> Failure
         return FailureClass.SLIPPED if lost_m <= SLIP_HEIGHT_M else FailureClass.DROPPED
     failed = [report for report in episode.reports if not report.succeeded or _is_empty(report)]
     if not task_succeeded and failed:
-        return _of_component(max(failed, key=lambda report: report.ended_s))
+        return _of_component(max(failed, key=lambda report: report.ended_s), episode)
     if not task_succeeded and not any(report.component in AFTER_GENERATION for report in episode.reports):
         return FailureClass.NO_CANDIDATE
     held = episode.world is not None and bool(episode.world.holds(episode.target).any())
     return FailureClass.GRASP_MISSED if grasps and episode.target and not held else FailureClass.MISPLACED
 
 
-def _of_component(report: ComponentReport) -> FailureClass:
+def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> FailureClass:
     if report.component == "generation":
         reachable = report.figures.get(REACHABLE)
         return FailureClass.UNREACHABLE if reachable == 0.0 and _found_any(report) else FailureClass.NO_CANDIDATE
     if report.component == "planning":
         out_of_reach = report.figures.get(ERROR_CODE) == NO_IK_SOLUTION
         return FailureClass.UNREACHABLE if out_of_reach else FailureClass.NO_PLAN
-    return FailureClass.GRASP_MISSED if report.component == "grasp" else FailureClass.COLLISION
+    if report.component == "grasp":
+        return FailureClass.GRASP_MISSED
+    return FailureClass.COLLISION if _robot_collided(report, episode) else FailureClass.MOTION
+
+
+def _robot_collided(report: ComponentReport, episode: EpisodeMeasurements) -> bool:
+    """Returns whether a robot touched anything during a motion except the target and what it touched at the start."""
+    world = episode.world
+    if world is None:
+        return False
+    during = (world.times_s >= report.started_s) & (world.times_s <= report.ended_s)
+    return any(
+        bool(flags[during].any()) and not flags[0]
+        for pair, flags in world.contacts.items()
+        if pair & world.robots and episode.target not in pair
+    )
 
 
 def _is_empty(report: ComponentReport) -> bool:
