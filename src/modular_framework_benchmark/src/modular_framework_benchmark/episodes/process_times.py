@@ -33,7 +33,7 @@ def processor_time_s(nodes: Collection[str]) -> float:
         except OSError:  # the process has ended
             continue
         parent, session = int(fields[1]), int(fields[3])
-        is_daemon = parent not in known_parents and session not in set(processes) - {process}
+        is_daemon = parent not in known_parents and (session == process or session not in known_parents)
         if marks & words or trees & {parent, session} or is_daemon:
             trees |= {process, session}
             ticks += sum(map(int, fields[11:15]))

@@ -7,6 +7,7 @@ an object is the bounding box of its collision shapes in the model frame. "At th
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -271,22 +272,50 @@ class Upright(ObjectCondition):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Aligned(ObjectCondition):
+class PoseCondition(ObjectCondition):
+    """The frame of the object is near a pose.
+
+    Attributes:
+        distance: Largest distance from the pose [m].
+        angle: Largest rotation angle from the pose [rad]; pi allows every orientation.
+    """
+
+    distance: float = number(0.01, high=10.0)
+    angle: float = number(0.1, high=3.1416)
+
+    def within(self, world: WorldTrack) -> Flags:
+        """Returns whether the object is within both tolerances, shape (n,)."""
+        distances, angles = self._errors(world)
+        return (distances <= self.distance) & (angles <= self.angle)
+
+    def measured(self, world: WorldTrack) -> str:
+        """Returns the distance and the angle from the pose."""
+        distances, angles = self._errors(world)
+        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
+        return f"{self._found(f'{distances[-1]:.3f} m', f'{angles[-1]:.3f} rad')} ({wanted})"
+
+    @abstractmethod
+    def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
+        """Returns the distances [m] and the angles [rad] from the pose, each of shape (n,)."""
+
+    @abstractmethod
+    def _found(self, distance: str, angle: str) -> str:
+        """Returns the measured distance and angle in words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aligned(PoseCondition):
     """The frame of the object is at a pose in the world frame or in the frame of another model.
 
     Attributes:
         relative_to: Name of the model in whose frame the pose is given, or `world`.
         position: Wanted position of the object [m].
         rpy: Wanted roll, pitch and yaw of the object [rad].
-        distance: Largest distance from the position [m].
-        angle: Largest rotation angle from the orientation [rad]; pi allows every orientation.
     """
 
     relative_to: str = name(KeyKind.MODEL, WORLD, default=WORLD)
     position: tuple[float, float, float] = vector(low=-100.0, high=100.0)
     rpy: tuple[float, float, float] = vector(low=-6.2832, high=6.2832)
-    distance: float = number(0.01, high=10.0)
-    angle: float = number(0.1, high=3.1416)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -298,29 +327,21 @@ class Aligned(ObjectCondition):
         """Returns the condition in words."""
         return f"'{self.object}' is at {self.position} m, {self.rpy} rad of '{self.relative_to}'"
 
-    def within(self, world: WorldTrack) -> Flags:
-        """Returns whether the pose is within both tolerances, shape (n,)."""
-        distances, angles = self._errors(world)
-        return (distances <= self.distance) & (angles <= self.angle)
-
-    def measured(self, world: WorldTrack) -> str:
-        """Returns the distance and the angle from the wanted pose."""
-        distances, angles = self._errors(world)
-        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
-        return f"'{self.object}' is {distances[-1]:.3f} m and {angles[-1]:.3f} rad from its pose ({wanted})"
+    def _found(self, distance: str, angle: str) -> str:
+        return f"'{self.object}' is {distance} and {angle} from its pose"
 
     def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
-        body, positions, rotations = world.bodies[self.object], np.array(self.position), _rotation(self.rpy)
+        body, positions, rotations = (
+            world.bodies[self.object],
+            np.array(self.position),
+            Rotation.from_euler("xyz", self.rpy),
+        )
         if self.relative_to != WORLD:
             frame = world.bodies[self.relative_to]
             positions = frame.positions + frame.rotations.apply(positions)
             rotations = frame.rotations * rotations
         distances = np.linalg.norm(body.positions - positions, axis=1)
         return distances, (rotations.inv() * body.rotations).magnitude()
-
-
-def _rotation(rpy: tuple[float, float, float]) -> Rotation:
-    return Rotation.from_euler("xyz", rpy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -394,32 +415,16 @@ class Cleared(Condition):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NotMoved(ObjectCondition):
-    """The frame of the object is at its pose at the start of the task.
-
-    Attributes:
-        distance: Largest distance from the start [m].
-        angle: Largest rotation angle from the start [rad].
-    """
-
-    distance: float = number(0.01, high=10.0)
-    angle: float = number(0.1, high=3.1416)
+class NotMoved(PoseCondition):
+    """The frame of the object is at its pose at the start of the task."""
 
     @property
     def statement(self) -> str:
         """Returns the condition in words."""
         return f"'{self.object}' is where it was at the start"
 
-    def within(self, world: WorldTrack) -> Flags:
-        """Returns whether the object is within both tolerances of its start, shape (n,)."""
-        distances, angles = self._errors(world)
-        return (distances <= self.distance) & (angles <= self.angle)
-
-    def measured(self, world: WorldTrack) -> str:
-        """Returns the distance and the angle from the start."""
-        distances, angles = self._errors(world)
-        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
-        return f"'{self.object}' has moved by {distances[-1]:.3f} m and {angles[-1]:.3f} rad ({wanted})"
+    def _found(self, distance: str, angle: str) -> str:
+        return f"'{self.object}' has moved by {distance} and {angle}"
 
     def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
         body = world.bodies[self.object]
