@@ -188,6 +188,8 @@ def test_a_motion_into_one_under_way_is_not_begun_and_both_links_are_named(
     worked, motion, _, _ = right.plan()
     assert worked, "each arm alone may go there"
     begin(left, recorder, "left_joint1")
+    if in_one_go:  # at full speed the left arm moves on while the right arm plans
+        until(lambda: recorder.now("left_joint1") < -0.3, "the left arm at its full speed")
     done, report = report_of(lambda: right.go() if in_one_go else right.execute(motion), "execute")
     assert not done and report["error_code"] == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     said = report["reason"]

@@ -101,7 +101,7 @@ class WatchedMotion:
         if self._watch is None:
             self._context.execution.execute(self._trajectory, cancelled)
             return
-        self._check()
+        self._check_scene(self._context.monitor.snapshot())
         self._raise_if_blocked()
         self._start = rospy.Time.now()
         self._record()
@@ -131,11 +131,18 @@ class WatchedMotion:
             )
 
     def _admit(self, others: Sequence[PathWatch]) -> None:
-        """Checks that the motion does not hit the paths of running motions; raises PlanningError."""
-        if not others or self._watch is None:
+        """Checks that the motion hits neither the paths of running motions nor joints that moved; raises PlanningError.
+
+        No other check of other joints precedes the start, so a refused start always names the running motion.
+        """
+        assert self._watch is not None
+        scene = self._context.monitor.snapshot()
+        if not others:
+            self._check_other_joints(scene)
+            self._raise_if_blocked()
             return
         with self._watching:
-            hit = self._watch.robot_collision(self._as_planned(self._context.monitor.snapshot()), others, TIME_SHIFTS_S)
+            hit = self._watch.robot_collision(self._as_planned(scene), others, TIME_SHIFTS_S)
         if hit is not None:
             raise PlanningError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -162,8 +169,13 @@ class WatchedMotion:
             self._done.wait(pause_s)
 
     def _check(self) -> None:
-        """Checks the remaining path if the geometry of the scene changed or other joints moved."""
-        scene, watch = self._context.monitor.snapshot(), self._watch
+        scene = self._context.monitor.snapshot()
+        self._check_scene(scene)
+        self._check_other_joints(scene)
+
+    def _check_scene(self, scene: PlanningScene) -> None:
+        """Checks the remaining path if the geometry of the scene changed."""
+        watch = self._watch
         assert watch is not None
         with self._watching:
             watch.advance(scene.positions)
@@ -172,6 +184,12 @@ class WatchedMotion:
                 self._hit = watch.scene_collision(self._as_planned(scene))
                 if self._hit is not None:
                     self._blocked = "the scene changed and blocks the remaining motion"
+
+    def _check_other_joints(self, scene: PlanningScene) -> None:
+        """Checks the remaining path if joints outside the motion moved."""
+        watch = self._watch
+        assert watch is not None
+        with self._watching:
             if self._hit is None and watch.other_joints_moved(scene.positions):
                 others = self._context.execution.others(watch)
                 self._hit = watch.robot_collision(self._as_planned(scene), others)
