@@ -109,6 +109,8 @@ def scores(world: World, drawn: Draw, metric: Metric | None) -> Floats:
     if metric is None:
         return success.astype(float)
     sign = 1.0 if metric.better is Direction.HIGHER else -1.0
+    if metric.kind is MetricKind.PARTIAL_CREDIT:
+        return np.nan_to_num(drawn.values[metric.name])
     failed = ~success & (metric.component == "task" or world.mode != "task" or np.isnan(drawn.values[metric.name]))
     return np.where(failed, -np.inf, sign * drawn.values[metric.name])
 
@@ -163,6 +165,7 @@ def value(name: str, better: Direction = Direction.LOWER, **bounds: float) -> Me
 
 TIME = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit=LIMIT_S)
 SHARE = value("share", Direction.HIGHER, lowest=0.0, highest=1.0)
+PROGRESS = Metric("progress", "task", MetricKind.PARTIAL_CREDIT, Direction.HIGHER, lowest=0.0, highest=1.0)
 COUNT = Metric("count", "planning", MetricKind.COUNT, Direction.LOWER)
 
 
@@ -251,6 +254,18 @@ def times(rates: tuple[float, ...], centres: tuple[float, ...], spread: float = 
         return Draw(success, {"task_time": np.where(success, drawn, np.nan)})
 
     return World(draw, (metric,), no_winner=len(set(zip(rates, centres, strict=True))) == 1)
+
+
+def milestones(rates: tuple[float, ...], count: int = 4) -> World:
+    """Returns a world of tasks with milestones in order; the rate is that of reaching the next one."""
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        scene = generator.normal(0.0, 0.1, (pairs, 1, 1))
+        reached = generator.random((pairs, len(rates), count)) < np.array(rates)[:, None] + scene
+        progress = np.cumprod(reached, axis=2).sum(axis=2) / count
+        return Draw(progress == 1.0, {"progress": progress})
+
+    return World(draw, (PROGRESS,), no_winner=len(set(rates)) == 1)
 
 
 def problems(count: int, skewed: bool = False, mode: str = "planning") -> World:
