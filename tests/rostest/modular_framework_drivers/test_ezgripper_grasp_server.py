@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -253,6 +254,27 @@ def test_orders_without_arguments_are_services_too(gripper: Gripper) -> None:
     answer = rospy.ServiceProxy("ezgripper_emulator/state", Trigger)()
     assert answer.success
     assert "opening=" in answer.message
+
+
+def test_a_fault_is_on_the_diagnostics_without_any_goal_until_it_ends(gripper: Gripper) -> None:
+    levels: list[int] = []
+    faults: list[str] = []
+
+    def on_diagnostics(message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == "ezgripper_server: gripper":
+                levels.append(ord(status.level) if isinstance(status.level, bytes) else status.level)
+                faults.append({value.key: value.value for value in status.values}["fault"])
+
+    subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, on_diagnostics)
+    until(lambda: faults and not faults[-1], "diagnostics without a fault")
+    gripper.command("unplug")
+    until(lambda: re.search("port .* is lost|cannot be opened", faults[-1]), "the fault on the diagnostics")
+    assert levels[-1] == DiagnosticStatus.ERROR
+    gripper.command("plug")
+    until(lambda: not faults[-1], "the end of the fault on the diagnostics")
+    assert levels[-1] == DiagnosticStatus.OK
+    subscriber.unregister()
 
 
 def test_joint_states_stop_while_the_gripper_is_out_of_reach(gripper: Gripper) -> None:

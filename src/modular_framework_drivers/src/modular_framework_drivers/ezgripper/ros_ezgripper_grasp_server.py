@@ -19,6 +19,7 @@ from modular_framework_drivers.ezgripper.grip import Motion, StandstillDetector
 from modular_framework_drivers.ezgripper.gripper_servos import CALIBRATION_TORQUE, CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+from modular_framework_drivers.ezgripper.ros_gripper_report import GripperReport
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.publishing import publish
 from modular_framework_ros.ros_node_handle import RosNodeHandle
@@ -158,7 +159,7 @@ def main() -> int:
     Parameters: see `parameters/ezgripper_grasp_action_server.yaml`. The `max_torque` of a goal is in servo units and is
     limited to 800.
 
-    Publishers: `joint_states`.
+    Publishers: `joint_states`; `/diagnostics`, with the fault of the gripper.
 
     Raises:
         ParameterError: If a parameter is missing or invalid.
@@ -170,7 +171,10 @@ def main() -> int:
     gripper = EzGripper(settings)
     server = GraspServer(gripper_group(joint), EzGripperManipulator(gripper, joint))
     server.connect(name)
+    report = GripperReport(gripper)
+    report.connect()
     rospy.loginfo("%s at %s listens to action '%s'.", settings.name, settings.port_name, rospy.resolve_name(name))
     rospy.spin()
+    report.close()
     gripper.close()
     return 0
