@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Goals of very many points, sent to a running trajectory controller: what they do to its loop and to a cancel.
 
-A motion is under way. A goal of 100,000 points arrives, valid or not, and 10 ms after it was begun to be sent the
-motion is canceled. Noted are how late the cycles of the loop began from then until the goal was answered, and how long
-after the cancel the motion ended. A goal of ten points shows what the load of the machine does without such goals.
+A motion is under way. A client in another process sends a goal of 100,000 points, valid or not, and cancels the motion
+10 ms after it began to send the goal. Noted are how late the cycles of the loop began from then until the goal was
+answered, and how long after the cancel the client learned that the motion has ended. No cycle may begin more than 2 ms
+late, and every cancel must take effect within 20 ms: the bars hold for the maximum over all repetitions.
+
+A goal of ten points shows what the machine does without such goals. Beside the figures are the longest time for which
+the loop had no processor, the longest time for which a witness had none (see `processor_witness.py`), the time that the
+host kept for other machines, and the load: they tell a late loop from a machine that was busy elsewhere.
 """
 
 from __future__ import annotations
@@ -14,7 +19,10 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+from processor_witness import Witnesses, longest_s
 
 POINTS = 100_000
 STEP_S = 1e-3
@@ -23,7 +31,24 @@ ANSWER_S = 60.0
 WATCHED_S = 3.0  # from the goal on, also where the answer comes at once: a busy machine is late now and then
 MAX_LATE_S = 2e-3  # of a cycle, while such a goal is received, checked and followed
 MAX_CANCEL_S = 0.02
-NOISE = "ten points, valid"
+NOISE = "ten points, refused"
+
+
+@dataclass(frozen=True, slots=True)
+class LostTime:
+    """Processor time that neither the loop nor its client got.
+
+    Attributes:
+        loop_ms: Longest time for which the loop was due without a processor [ms].
+        witness_ms: Longest time for which a witness had no processor [ms]; None without permission for real time.
+        stolen_s: Processor time that the host of this machine kept for others [s].
+        load: Load of the machine, 1 minute.
+    """
+
+    loop_ms: float
+    witness_ms: float | None
+    stolen_s: float
+    load: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,26 +60,31 @@ class LongGoalFigures:
         late_ms: how late the latest cycle of each repetition began, ascending [ms].
         cancel_ms: how long after its cancel the motion ended, in each repetition, ascending [ms].
         answer_s: how long the controller took to accept or refuse the goal, at most [s].
-        load: of the machine, 1 minute.
+        lost: processor time that was lost meanwhile.
     """
 
     kind: str
     late_ms: list[float]
     cancel_ms: list[float]
     answer_s: float
-    load: float
+    lost: LostTime
 
-    def faults(self, noise: LongGoalFigures) -> list[str]:
-        """What the goal did beyond the bars, if `noise` is what happens without such goals."""
-        late_ms, cancel_ms, noise_late_ms, noise_cancel_ms = (
-            values[len(values) // 2] for values in (self.late_ms, self.cancel_ms, noise.late_ms, noise.cancel_ms)
+    def faults(self) -> list[str]:
+        """Returns the violated bars, with the time that the machine lost."""
+        lost = self.lost
+        beside = (
+            f"without a processor: loop {lost.loop_ms:.1f} ms, "
+            f"witness {'unknown' if lost.witness_ms is None else f'{lost.witness_ms:.1f} ms'}; "
+            f"the host kept {lost.stolen_s:.2f} s; load {lost.load:.1f}"
         )
-        faults = []
-        if late_ms > noise_late_ms + 1e3 * MAX_LATE_S:
-            faults.append(f"{self.kind}: cycles {late_ms:.1f} ms late, without such a goal {noise_late_ms:.1f}")
-        if cancel_ms > max(noise_cancel_ms, 1e3 * MAX_CANCEL_S):
-            faults.append(f"{self.kind}: cancel after {cancel_ms:.1f} ms, without such a goal {noise_cancel_ms:.1f}")
-        return faults
+        return [
+            f"{self.kind}: {name} {values[-1]:.1f} ms, allowed {1e3 * limit_s:g} ms ({beside})"
+            for name, values, limit_s in (
+                ("a cycle began late by", self.late_ms, MAX_LATE_S),
+                ("a cancel took", self.cancel_ms, MAX_CANCEL_S),
+            )
+            if values[-1] > 1e3 * limit_s
+        ]
 
     def row(self) -> str:
         """One line of the table."""
@@ -63,12 +93,18 @@ class LongGoalFigures:
             middle, high = values[len(values) // 2], values[min(len(values) - 1, round(0.9 * (len(values) - 1)))]
             return f"{middle:8.2f} {high:8.2f} {values[-1]:8.2f}"
 
-        return f"{self.kind:22} {three(self.late_ms)}  {three(self.cancel_ms)}  {self.answer_s:8.2f} {self.load:6.1f}"
+        lost = self.lost
+        witness = "-" if lost.witness_ms is None else f"{lost.witness_ms:.2f}"
+        return (
+            f"{self.kind:22} {three(self.late_ms)}  {three(self.cancel_ms)}  {self.answer_s:8.2f} "
+            f"{lost.loop_ms:8.2f} {witness:>8} {lost.stolen_s:8.2f} {lost.load:6.1f}"
+        )
 
 
 HEADER = (
     f"{f'{POINTS} points, {POINTS * STEP_S:g} s':22} {'latest cycle [ms]':>26}  {'cancel to end [ms]':>26}  "
-    f"{'answer':>8} {'load':>6}\n{'':22} {'p50':>8} {'p90':>8} {'max':>8}  {'p50':>8} {'p90':>8} {'max':>8}  {'[s]':>8}"
+    f"{'answer':>8} {'no processor [ms]':>17} {'stolen':>8} {'load':>6}\n{'':22} {'p50':>8} {'p90':>8} {'max':>8}  "
+    f"{'p50':>8} {'p90':>8} {'max':>8}  {'[s]':>8} {'loop':>8} {'witness':>8} {'[s]':>8}"
 )
 
 
@@ -105,11 +141,12 @@ def kinds_of_goals(joints: list[str]) -> dict[str, bytes]:
         for point in trajectory.points:
             point.time_from_start = rospy.Duration(1)
 
-    def keep_ten_points(trajectory: Any) -> None:
+    def spoil_ten_points(trajectory: Any) -> None:
         del trajectory.points[10:]
+        spoil_every_point(trajectory)
 
     return {
-        NOISE: serialised(keep_ten_points),
+        NOISE: serialised(spoil_ten_points),
         "valid, quintic": serialised(lambda trajectory: None),
         "valid, linear": serialised(drop_velocities),
         "beyond the limits": serialised(
@@ -119,6 +156,16 @@ def kinds_of_goals(joints: list[str]) -> dict[str, bytes]:
         "times do not increase": serialised(stop_time),
         "unknown joint": serialised(lambda trajectory: trajectory.joint_names.append("none")),
     }
+
+
+@dataclass(frozen=True, slots=True)
+class _Once:
+    """Figures of one goal: latest cycle, time of the loop without a processor, cancel and answer [s]."""
+
+    late_s: float
+    no_processor_s: float
+    cancel_s: float
+    answer_s: float
 
 
 class LongGoalBench:
@@ -158,16 +205,21 @@ class LongGoalBench:
 
     def run(self, kind: str, goal: bytes, repetitions: int) -> LongGoalFigures:
         """Sends a goal some times."""
-        late_ms, cancel_ms, answers_s = [], [], []
+        late_ms, cancel_ms, answers_s, lost_ms = [], [], [], []
+        witnesses, stolen_before_s = Witnesses(), stolen_s()
         for _ in range(repetitions):
             self._sent += 1
-            late_s, cancel_s, answer_s = self._once(goal, f"{self._sent:04}")
-            late_ms.append(1e3 * late_s)
-            cancel_ms.append(1e3 * cancel_s)
-            answers_s.append(answer_s)
-        return LongGoalFigures(kind, sorted(late_ms), sorted(cancel_ms), max(answers_s), os.getloadavg()[0])
+            once = self._once(goal, f"{self._sent:04}")
+            late_ms.append(1e3 * once.late_s)
+            cancel_ms.append(1e3 * once.cancel_s)
+            answers_s.append(once.answer_s)
+            lost_ms.append(1e3 * once.no_processor_s)
+        taken = witnesses.taken()
+        witness_ms = None if taken is None else 1e3 * max(map(longest_s, taken))
+        lost = LostTime(max(lost_ms), witness_ms, stolen_s() - stolen_before_s, os.getloadavg()[0])
+        return LongGoalFigures(kind, sorted(late_ms), sorted(cancel_ms), max(answers_s), lost)
 
-    def _once(self, goal: bytes, name: str) -> tuple[float, float, float]:
+    def _once(self, goal: bytes, name: str) -> _Once:
         import rospy
         from actionlib import CommState
         from actionlib_msgs.msg import GoalID
@@ -207,17 +259,22 @@ class LongGoalBench:
             raise RuntimeError(f"no answer to a goal of {POINTS} points, or to a cancel, within {ANSWER_S:g} s")
         answered_s = time.monotonic()
         time.sleep(max(0.2, sent_s + WATCHED_S - answered_s))
-        late_s = latest_cycle_s()
+        late_s, no_processor_s = loop_lateness_s()
         self._cancels.publish(GoalID(id=name))
         sender.join()
-        return late_s, ended_s[0] - canceled_s, answered_s - sent_s
+        return _Once(late_s, no_processor_s, ended_s[0] - canceled_s, answered_s - sent_s)
 
 
-def latest_cycle_s() -> float:
-    """Returns how late the latest cycle began since the statistics were reset [s], its work included."""
+def loop_lateness_s() -> tuple[float, float]:
+    """Returns the longest delay of a cycle and the longest time without a processor since the last reset [s]."""
     import rospy
     from diagnostic_msgs.msg import DiagnosticArray
 
     status = rospy.wait_for_message("/diagnostics", DiagnosticArray, 10.0).status[0]
     values = {value.key: value.value for value in status.values}
-    return float(values["late_max_us"]) * 1e-6
+    return float(values["late_max_us"]) * 1e-6, float(values["no_processor_max_us"]) * 1e-6
+
+
+def stolen_s() -> float:
+    """Processor time that the host of this machine took away so far [s]."""
+    return int(Path("/proc/stat").read_text().split()[8]) / os.sysconf("SC_CLK_TCK")
