@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads parameters from YAML, xacro and text files. The module name is the name in ROS 2."""
+"""Loads parameters from YAML, xacro and text files. The module has the same name as in ROS 2."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xacro_rospkg.expansion import find_package
 
 from launch_param_builder.angle_yaml import parse_yaml
 
-MAX_LISTED_FILES = 20  # in an error message
+MAX_LISTED_FILES = 20  # maximum number of files listed in an error message
 ParameterValueType = str | int | float | bool | list[Any] | dict[str, Any]
 
 

@@ -14,7 +14,7 @@ from moveit_commander.chain_jacobian import jacobian, link_pose
 from moveit_commander.joints import Joint
 
 STEPS = 200
-DAMPING = 0.02  # [m]; damps joint motion near singularities
+DAMPING = 0.02  # damping near singularities [m]
 MAX_STEP = 0.3  # [rad or m]
 STANDSTILL = 1e-6
 

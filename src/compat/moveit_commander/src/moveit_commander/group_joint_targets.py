@@ -120,7 +120,7 @@ class GroupJointTargets(GroupSettings):
         return dict(self._group.states[target])
 
     def remember_joint_values(self, name: str, values: Iterable[float] | None = None) -> None:
-        """Stores joint values under a name; without values, the current ones."""
+        """Stores joint values under a name; by default the current values."""
         kept = self.get_current_joint_values() if values is None else [float(value) for value in values]
         group_values(self._group, kept)
         self._remembered[name] = kept

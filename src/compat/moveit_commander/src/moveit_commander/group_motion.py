@@ -29,7 +29,7 @@ from moveit_commander.group_connection import EXECUTE_ACTION, MOVE_ACTION, code_
 from moveit_commander.group_pose_targets import GroupPoseTargets
 from moveit_commander.servers import ACTION_TIMEOUT_S, is_heard
 
-ANSWER_MARGIN_S = 30.0  # beyond the planning time, for queueing, smoothing and collision checks
+ANSWER_MARGIN_S = 30.0  # added to the planning time, for queueing, smoothing and collision checks
 MOTION_TIMEOUT_S = 600.0
 
 

@@ -176,7 +176,7 @@ class GroupSettings(GroupConnection):
         return self._planner_id
 
     def set_num_planning_attempts(self, num_planning_attempts: int) -> None:
-        """Sets the number of plans, of which the shortest is returned."""
+        """Sets the number of plans; the shortest plan is returned."""
         self._attempts = int(num_planning_attempts)
 
     def set_workspace(self, ws: Sequence[float]) -> None:

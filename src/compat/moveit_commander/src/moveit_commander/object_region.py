@@ -25,7 +25,7 @@ class Region:
 
 
 def inside(item: CollisionObject, region: Region) -> bool:
-    """Returns whether the origins of all shapes of an object (or its own without shapes) are within the region."""
+    """Returns whether all shape origins of an object, or its own origin without shapes, lie in the region."""
     shapes = [*item.primitive_poses, *item.mesh_poses, *item.plane_poses]
     points = [transform_point(item.pose, pose.position) for pose in shapes]
     origin = item.pose.position
@@ -33,7 +33,7 @@ def inside(item: CollisionObject, region: Region) -> bool:
 
 
 def transform_point(pose: Pose, point: Point) -> Vector:
-    """Returns a point of a pose's frame in the parent frame of the pose."""
+    """Transforms a point from the frame of a pose to the parent frame of the pose."""
     orientation = pose.orientation
     quaternion = [orientation.x, orientation.y, orientation.z, orientation.w]
     rotation = Rotation.from_quat(quaternion if any(quaternion) else [0.0, 0.0, 0.0, 1.0])

@@ -175,7 +175,7 @@ class RobotCommander:
         return self._groups[name]
 
     def get_default_owner_group(self, joint_name: str) -> str | None:
-        """Returns the group with the fewest links among those that contain a joint, or None without such a group."""
+        """Returns the smallest group that contains a joint, by the number of links; None if no group contains it."""
         owners = [
             group for group in self._model.groups.values() if any(joint.name == joint_name for joint in group.joints)
         ]

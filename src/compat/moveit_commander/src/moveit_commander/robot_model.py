@@ -51,7 +51,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class EndEffector:
-    """A group mounted on a link of another group; `parent_group` is empty without such a group."""
+    """A group mounted on a link; `parent_group` is the group of this link, or empty."""
 
     group: str
     parent_group: str
@@ -177,7 +177,7 @@ class RobotModel:
         return Group(name, joints, links, is_chain, effector, self._semantics.group_states.get(name, {}))
 
     def _end_effector(self, spec: srdf_reader.EndEffector) -> EndEffector:
-        """Returns an end effector; as in MoveIt, the default parent group is the one with the fewest joints."""
+        """Returns an end effector; as in MoveIt, the default parent group is the group with the fewest joints."""
         link = spec.parent_link
         possible = [group for group in self.groups.values() if link in group.links and group.name != spec.group]
         named = [group for group in possible if group.name == spec.parent_group]

@@ -117,7 +117,7 @@ class CurrentState:
         return self.model.complete(received | self._base_values())
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:
-        """Returns the known state as a message in the planning frame; `positions` describes `needed`.
+        """Returns the current state as a message in the planning frame; `positions` documents the arguments.
 
         Without a planar or floating base from tf, move_group keeps its own base pose.
         """

@@ -23,7 +23,7 @@ ACTION_TIMEOUT_S = 5.0
 POLL_PERIOD_S = 0.02
 LISTENER_TIMEOUT_S = 5.0
 SETTLE_S = 0.1  # the server accepts a new connection slightly later than the client
-SERVER_LOST_S = 5.0  # unadvertised time after which an action server counts as ended
+SERVER_LOST_S = 5.0  # an action server that stays unadvertised for this time has ended
 
 
 def is_heard(publisher: rospy.Publisher) -> bool:
@@ -43,7 +43,7 @@ class Servers:
         Args:
             ns: Namespace of the move_group node's endpoints; "" for the namespace of this node.
         """
-        accept_connections_at_once()  # also for the topics of the user's script
+        accept_connections_at_once()  # this also affects the topics of the user's script
         self._ns = ns
         self._actions: dict[str, ActionCaller] = {}
 

@@ -48,8 +48,7 @@ class PackageYaml:
             unknown = sorted({name for name in ARGUMENT.findall(text) if name not in values})
             if unknown:
                 LOGGER.warning(
-                    "%s: no value for %s (looked in the xacro arguments of robot_description and in the defaults of "
-                    "launch/*); the text is kept",
+                    "%s: no value for %s (xacro arguments, defaults of launch/*); the placeholder is kept",
                     path,
                     ", ".join(f"$(arg {name})" for name in unknown),
                 )

@@ -29,7 +29,7 @@ def ros1_sensors(content: Mapping[str, Any], where: Path) -> dict[str, Any]:
         return {}
     missing = [item for item in sensors if isinstance(item, str) and not isinstance(content.get(item), Mapping)]
     if missing:
-        raise ParameterFileError(f"{where}: sensors lists {', '.join(missing)}; expected a mapping of that name, too")
+        raise ParameterFileError(f"{where}: sensors lists {', '.join(missing)}; add a mapping of that name")
     named = {item for item in sensors if isinstance(item, str)}
     listed = [content[item] if isinstance(item, str) else item for item in sensors]
     return {**{key: value for key, value in content.items() if key not in named}, "sensors": listed}

@@ -39,7 +39,7 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
         given = [f"{name}:={values[name]}" for name in _arguments_without_value(path) if name in values]
         loader.load(str(path), config, argv=given, verbose=False)
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError, OSError) as error:
-        reason = str(error).partition("\nROS path")[0]  # without the search path that rospkg appends
+        reason = str(error).partition("\nROS path")[0]  # excludes the search path that rospkg appends
         LOGGER.warning("%s: its parameters are left out, because roslaunch cannot load it: %s", path, reason)
         return {}
     return nested({name: parameter.value for name, parameter in sorted(config.params.items())})

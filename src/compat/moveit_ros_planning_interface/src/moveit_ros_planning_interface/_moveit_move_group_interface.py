@@ -354,7 +354,7 @@ class MoveGroupInterface:
         return self._commander.place(object_name, list_to_pose(location), plan_only)
 
     def place_poses_list(self, object_name: str, poses: Sequence[bytes], plan_only: bool = False) -> bool:
-        """Places an object at one of several poses and returns whether that succeeded.
+        """Places an object at one of several poses and returns whether the placing succeeded.
 
         Args:
             object_name: Held object.
@@ -364,7 +364,7 @@ class MoveGroupInterface:
         return self._commander.place(object_name, [read(PoseStamped, pose) for pose in poses], plan_only)
 
     def place_locations_list(self, object_name: str, locations: Sequence[bytes], plan_only: bool = False) -> bool:
-        """Places an object at one of several locations and returns whether that succeeded.
+        """Places an object at one of several locations and returns whether the placing succeeded.
 
         Args:
             object_name: Held object.

@@ -89,7 +89,7 @@ class Container(State):
         """
         stack = self._construction.stack
         if not stack or stack[-1] is not self:
-            raise InvalidStateError("cannot close a container that is not the one opened last")
+            raise InvalidStateError("cannot close a container other than the last opened container")
         stack.pop()
 
     def is_opened(self) -> bool:

@@ -25,7 +25,7 @@ class InvalidStateError(SmachError):
 
 
 class InvalidConstructionError(SmachError):
-    """A container is used while it is not open (or closed) as required."""
+    """A container is used in the wrong state: open instead of closed, or closed instead of open."""
 
 
 class InvalidUserCodeError(SmachError):

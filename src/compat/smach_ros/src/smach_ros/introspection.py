@@ -138,7 +138,7 @@ class IntrospectionServer:
             if not self._proxies:
                 self.construct(self._server_name, self._state, self._path)
             self._advertise()
-            self._running = True  # from now on the containers' callbacks publish
+            self._running = True  # the containers' callbacks publish from here on
             self._run_number += 1
             arguments = (self._run_number,)
         threading.Thread(

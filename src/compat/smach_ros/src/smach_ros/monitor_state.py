@@ -67,7 +67,7 @@ class MonitorState(smach.State):
         self.reason = ""
 
     def execute(self, userdata: Any) -> str:
-        """Checks messages until a verdict is reached."""
+        """Checks messages until one decides the outcome."""
         self.reason = ""
         self._checks = 0
         self._verdict = None
@@ -81,14 +81,14 @@ class MonitorState(smach.State):
                 if self.preempt_requested() or going_down():
                     return self._preempted()
                 if limit.over():
-                    self._decide("invalid", f"no verdict on '{self._topic}' within {self._timeout_s} s")
+                    self._decide("invalid", f"no decision from '{self._topic}' within {self._timeout_s} s")
                 self._wake.wait(POLL_PERIOD_S)
         finally:
             subscriber.unregister()
         return self._preempted() if self.preempt_requested() else self._verdict
 
     def _check(self, message: Any, userdata: Any) -> None:
-        """Evaluates the condition for a message; the first verdict is final."""
+        """Evaluates the condition for a message; the first decision is final."""
         with self._lock:
             if self._verdict is not None:
                 return
@@ -111,7 +111,7 @@ class MonitorState(smach.State):
         self._wake.set()
 
     def _preempted(self) -> str:
-        self.reason = f"asked to stop while looking at '{self._topic}'"
+        self.reason = f"stopped while monitoring '{self._topic}'"
         self.service_preempt()
         return "preempted"
 

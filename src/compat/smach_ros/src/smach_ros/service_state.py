@@ -102,7 +102,7 @@ class ServiceState(ServerCallState):
         except CallError as error:
             if not self._stopped():
                 return self._abort(str(error))
-        return self._preempted(f"service '{self._service_name}': asked to stop before it answered")
+        return self._preempted(f"service '{self._service_name}': stopped before it responded")
 
 
 def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:

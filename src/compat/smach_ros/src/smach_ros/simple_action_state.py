@@ -108,7 +108,7 @@ class SimpleActionState(ServerCallState):
         with self._lock:
             super().request_preempt()
             if self._goal_is_out and self._client is not None:
-                smach.loginfo(f"action '{self._action_name}': asked to stop, the goal is cancelled")
+                smach.loginfo(f"action '{self._action_name}': stopped; the goal is cancelled")
                 _cancel(self._client)
         self._wake.set()
 
@@ -124,11 +124,11 @@ class SimpleActionState(ServerCallState):
                 self._server_wait_timeout_s,
                 f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}'",
             ):
-                return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
+                return self._preempted(f"action '{self._action_name}': stopped before the goal was sent")
             goal = self._source.make(userdata)
             with self._lock:  # orders a request to stop either before this block or after the goal is active
                 if self.preempt_requested():
-                    return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
+                    return self._preempted(f"action '{self._action_name}': stopped before the goal was sent")
                 client = self._connect()
                 client.send_goal(goal, done_cb=lambda status, result: self._wake.set())
                 self._goal_is_out = True

@@ -60,7 +60,7 @@ def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
     for key, value in values.items():
         try:
             fits = is_plain(value) and (strict or len(pickle.dumps(value, PROTOCOL)) <= MAX_VALUE_BYTES)
-        except Exception:  # modified concurrently by its owner, or infinitely nested
+        except Exception:  # the value is modified concurrently, or nested infinitely
             fits = False
         if not fits and strict:
             raise UserdataError(f"userdata '{key}' is a {type(value).__name__}; allowed are plain values and messages")

@@ -35,7 +35,7 @@ def set_preempt_handler(sc: smach.Container) -> None:
         while sc.is_running():
             if time.monotonic() >= end:
                 active = sc.get_active_states()
-                rospy.logwarn(f"the state machine was asked to stop and did not within {STOP_TIME_S} s: {active}")
+                rospy.logwarn(f"the state machine did not stop within {STOP_TIME_S} s: {active}")
                 return
             time.sleep(0.02)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The xacro language with packages found the ROS 1 way.
+"""The xacro language, with package look-up as in ROS 1.
 
 PyPI's xacro looks packages up in the ament index of ROS 2. Here ``$(find pkg)`` goes through rospkg, that is along
-``ROS_PACKAGE_PATH``. The library is deliberately not called ``xacro``:
-that name belongs to the PyPI module this one drives.
+``ROS_PACKAGE_PATH``. The library is not called ``xacro``, because that is the name of the PyPI module behind this
+library.
 """
 
 from xacro_rospkg.expansion import PackageNotFoundError, expand, main

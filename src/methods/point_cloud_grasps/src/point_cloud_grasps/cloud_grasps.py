@@ -2,8 +2,9 @@
 """Generates and ranks antipodal grasps of an object in a point cloud.
 
 The planning scene gives only the search region: the name, position and approximate size of the object. Its shape comes
-from the cloud (:mod:`segmentation`, :mod:`seen_shape`). Contact pairs are sampled from that shape (:mod:`cloud_pairs`),
-at most half a pad height below the visible surface, since the shape further below is unknown. The hand avoids the other
+from the cloud (:mod:`segmentation`, :mod:`seen_shape`). Contact pairs are sampled from that shape
+(:mod:`cloud_pairs`), at most half a pad height below the visible surface. The shape further below is unknown. The hand
+avoids the other
 points of the cloud as well as the objects of the planning scene.
 """
 
@@ -141,7 +142,7 @@ def _support(query: GraspQuery, points: Array, generator: np.random.Generator) -
 
 
 def _surface_points(query: GraspQuery, points: Array, settings: CloudSettings) -> tuple[Array, float]:
-    """Returns the points above the support without isolated ones, and the point spacing on the object [m].
+    """Returns the points above the support without isolated points, and the point spacing on the object [m].
 
     Raises:
         NoCandidatesError: The object has too few points.

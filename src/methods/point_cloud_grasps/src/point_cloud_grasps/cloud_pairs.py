@@ -22,7 +22,7 @@ class CloudPairSettings(PairRules):
     """Feasibility limits of a contact pair, and search effort.
 
     Attributes:
-        contact_samples: Number of sampled contacts, of which all pairs are evaluated.
+        contact_samples: Number of sampled contacts; all pairs of these contacts are evaluated.
         max_pairs: Maximum number of kept pairs, ranked by alignment and distance from the centre.
     """
 

@@ -195,7 +195,7 @@ def _grasp_at(
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    """Pose and contact of the hand at one position along the object.
+    """Pose and contact of the hand at a position along the object.
 
     Attributes:
         z: Height of the grasp frame [m].

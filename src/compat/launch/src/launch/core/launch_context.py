@@ -46,7 +46,7 @@ class _Locals:
 
 
 class LaunchContext:
-    """State of a launch that entities read and write during their visit.
+    """State of a launch, read and modified by the visited entities.
 
     Args:
         argv: Arguments of the launch.
