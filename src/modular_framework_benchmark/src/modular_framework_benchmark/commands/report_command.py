@@ -55,7 +55,9 @@ def _parser() -> argparse.ArgumentParser:
         help="write this figure as an image, by default PNG; 'list' prints the names of the figures",
     )
     parser.add_argument(
-        "--mean-intervals", action="store_true", help="give mean differences of bounded metrics an interval"
+        "--mean-intervals",
+        action="store_true",
+        help="compute confidence intervals for mean differences of bounded metrics",
     )
     parser.add_argument("--table", choices=sorted(TABLES), help="print the table of methods for a paper")
     return parser

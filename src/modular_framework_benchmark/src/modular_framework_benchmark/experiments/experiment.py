@@ -45,7 +45,7 @@ class Combination:
         configuration: Level of each factor, keyed by factor name.
         settings: Settings without scene and problem, which each trial draws.
         objects: Objects that each trial places.
-        problems: Planning problems, of which each trial has one.
+        problems: Planning problems; each trial has one problem.
     """
 
     configuration: Mapping[str, str]

@@ -54,14 +54,14 @@ def setting(read: ReadValue, default: Any, *, required: bool = False, key: str =
 
 @dataclass(frozen=True, slots=True)
 class ReadSettings(Generic[SettingsT]):
-    """Settings of a combination of levels, as far as the file is readable.
+    """Readable settings of a combination of levels.
 
     Attributes:
         node: Mapping of the file: base settings overridden by the levels.
         settings: Settings without scene and problem, which each trial draws; unreadable keys have their default.
         unreadable: Keys without a usable value.
         objects: Objects that each trial places.
-        problems: Planning problems, of which each trial has one.
+        problems: Planning problems; each trial has one problem.
     """
 
     node: NodeMapping

@@ -26,7 +26,7 @@ class Problem:
 
 
 NO_PROBLEM = Problem("", "", "")
-"""Problem of a combination, whose trials draw their problems."""
+"""Placeholder in a combination of levels; each trial then has its own problem."""
 
 
 def read_problems(reading: Reading, node: Node, key: str) -> list[Problem]:
@@ -48,7 +48,8 @@ def read_problems(reading: Reading, node: Node, key: str) -> list[Problem]:
             reading.faults.add(item.location, f"there is no folder {folder}; name a folder of scene and request files")
         elif not found:
             reading.faults.add(
-                item.location, f"{folder} has no problem; allowed: sceneNNNN.yaml beside requestNNNN.yaml, at any depth"
+                item.location,
+                f"{folder} contains no problems; allowed: sceneNNNN.yaml beside requestNNNN.yaml, at any depth",
             )
         problems += found
     if isinstance(node, Sequence) and not node.items:

@@ -34,7 +34,7 @@ class FailureClass(Enum):
     GRASP_MISSED = "grasp missed"  # the gripper closed, and never held the object
     SLIPPED = "slipped"  # the gripper lost the object near its start
     DROPPED = "dropped"  # the gripper lost the object higher above its start
-    MISPLACED = "misplaced"  # the object is not where it should be, or not as it should be
+    MISPLACED = "misplaced"  # the final position or orientation of the object is wrong
     TIMEOUT = "timeout"
     DIED = "component died"
     INVALID = "invalid"

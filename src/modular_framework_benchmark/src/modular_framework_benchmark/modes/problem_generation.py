@@ -24,7 +24,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 
 REACH_SAMPLES = 1000
 STRAIGHT_STEP = 0.02  # [rad or m]
-ATTEMPTS = 1000  # to sample a state before new boxes are drawn
+ATTEMPTS = 1000  # attempts to sample a state before new boxes are sampled
 SCENE_ATTEMPTS = 20
 BOX_EDGE_IN_REACH = (0.05, 0.3)  # smallest and largest edge as a fraction of the robot's reach
 BOX_DISTANCE_IN_REACH = (0.4, 1.0)  # distance of a box's centre from the base as a fraction of the reach

@@ -24,7 +24,7 @@ class Robot:
         planning: `robot_description_planning`: limits and default scaling factors.
         pipelines: Parameters of the planning pipelines, keyed by name.
         urdf: Robot description (URDF text).
-        mesh_folder: Folder of the meshes of packages that do not exist; None for no such meshes.
+        mesh_folder: Folder with the meshes of packages that are not installed; None for none.
     """
 
     model: RobotModel

@@ -101,7 +101,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
         return settings.robot, settings.group, settings.solver, settings.timeout, settings.parameters
 
     def prepare(self, settings: KinematicsSettings) -> InverseKinematics:
-        """Returns the solver after a first solution, which takes longer than the following ones."""
+        """Returns the solver after a first solution, which takes longer than later solutions."""
         robot = self.robot(settings.robot)
         group = robot.chain(settings.group)
         check_solver(settings.solver)

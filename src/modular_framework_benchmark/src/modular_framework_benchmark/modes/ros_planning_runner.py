@@ -38,11 +38,11 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME, Figure
 
 MOTION_PERIOD_S = 0.01
-CLEARANCE_STATES = 25  # per motion; the distances of a state take about 0.1 s on detailed meshes
+CLEARANCE_STATES = 25  # states per motion; the distances of one state take about 0.1 s with detailed meshes
 
 
 FULL_SPEED = {"default_velocity_scaling_factor": 1.0, "default_acceleration_scaling_factor": 1.0}
-PLUGINS = {  # of pipelines that the robot's configuration lacks
+PLUGINS = {  # defaults for pipelines without a configuration
     "ompl": "ompl_interface/OMPLPlanner",
     "pilz_industrial_motion_planner": "pilz_industrial_motion_planner/CommandPlanner",
     "stomp": "stomp_moveit/StompPlannerManager",

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Digests of the software and files of an experiment's episodes, which an extension of the experiment must reproduce.
 
-The digests of a launch file cover its parameters, the packages of its nodes and plugins, and the files that its
-arguments, parameters and nodes name: by path, or by package and name, as a node that loads the file itself.
+The digests of a launch file cover its parameters, the packages of its nodes and plugins, and the files that arguments,
+parameters and nodes name by path, or by package and name.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ class _Named:
 
     Attributes:
         files: Existing files: named by path, as PACKAGE/NAME, or as PACKAGE and later NAME.
-        packages: Packages of which a name is no file, such as the class of a plugin.
+        packages: Packages that are named without a file, such as the package of a plugin class.
     """
 
     def __init__(self) -> None:
@@ -197,7 +197,7 @@ class _Named:
         self.packages: set[str] = set()
 
     def add(self, text: str) -> None:
-        """Adds what a text names, such as the arguments of a node."""
+        """Adds the files and packages that a text names, such as the arguments of a node."""
         package = ""
         for word in text.split():
             first, _, rest = word.partition("/")

@@ -85,7 +85,7 @@ class Lifted(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is more than {self.height:g} m higher than at the start"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -107,7 +107,7 @@ class HeldFor(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is in the gripper"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -131,7 +131,7 @@ class InRegion(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is in the region '{self.region.name}'"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -166,7 +166,7 @@ class On(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' lies on '{self.support}'"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -224,7 +224,7 @@ class Inside(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is inside '{self.container}'"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -254,7 +254,7 @@ class Upright(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' stands upright"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -300,7 +300,7 @@ class PoseCondition(ObjectCondition):
 
     @abstractmethod
     def _found(self, distance: str, angle: str) -> str:
-        """Returns the measured distance and angle in words."""
+        """Returns a description of the measured distance and angle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -324,7 +324,7 @@ class Aligned(PoseCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is at {self.position} m, {self.rpy} rad of '{self.relative_to}'"
 
     def _found(self, distance: str, angle: str) -> str:
@@ -365,7 +365,7 @@ class JointAtLeast(Condition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -401,7 +401,7 @@ class Cleared(Condition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"none of {', '.join(self.objects)} is in the region '{self.region.name}'"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -420,7 +420,7 @@ class NotMoved(PoseCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' is where it was at the start"
 
     def _found(self, distance: str, angle: str) -> str:
@@ -449,7 +449,7 @@ class NoContact(ObjectCondition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"'{self.object}' does not touch '{self.other}'"
 
     def within(self, world: WorldTrack) -> Flags:
@@ -465,7 +465,7 @@ class NoContact(ObjectCondition):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stacked(Condition):
-    """Each object lies on the one before, as in `On`.
+    """Each object lies on the previous object, as in `On`.
 
     Attributes:
         objects: Names of at least two objects, the lowest first.
@@ -482,7 +482,7 @@ class Stacked(Condition):
 
     @property
     def statement(self) -> str:
-        """Returns the condition in words."""
+        """Returns a description of the condition."""
         return f"{', '.join(self.objects)} are stacked, the lowest first"
 
     @property

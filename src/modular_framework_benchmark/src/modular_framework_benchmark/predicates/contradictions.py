@@ -38,13 +38,13 @@ def contradiction(predicate: Predicate) -> str:
 
 
 def repetition(milestones: Sequence[Milestone]) -> tuple[int, str]:
-    """Returns the index of a milestone that is always reached with the one before, and the name of the one before.
+    """Returns the index of a milestone that is always reached together with the previous milestone, and its name.
 
     Args:
         milestones: Milestones in their order.
 
     Returns:
-        Index of the later milestone and name of the one before; (-1, "") for none.
+        Index of the later milestone and name of the previous milestone; (-1, "") for none.
     """
     for later, (before, after) in enumerate(zip(milestones, milestones[1:], strict=False), 1):
         if _implies(before.predicate, after.predicate):

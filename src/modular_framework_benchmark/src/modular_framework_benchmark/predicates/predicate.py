@@ -25,7 +25,7 @@ class Stage(Protocol):
         """Returns whether a condition is satisfied at each moment, without its duration, shape (n,)."""
 
     def found(self, condition: Condition) -> str:
-        """Returns what was found at the last moment, in place of what the condition wants."""
+        """Returns the last measured value, in contrast to the required value."""
 
 
 class Predicate(Tagged, ABC):
@@ -83,7 +83,7 @@ class Condition(Predicate):
     @property
     @abstractmethod
     def statement(self) -> str:
-        """Returns the condition in words, which an operator confirms or denies."""
+        """Returns a description of the condition that an operator confirms or denies."""
 
     @abstractmethod
     def within(self, world: WorldTrack) -> Flags:
@@ -91,7 +91,7 @@ class Condition(Predicate):
 
     @abstractmethod
     def measured(self, world: WorldTrack) -> str:
-        """Returns the measured value at the last moment of the true state, with the wanted value."""
+        """Returns the measured value at the last moment of the true state, with the required value."""
 
 
 def sustained(satisfied: Flags, times_s: Floats, duration_s: float) -> Flags:
@@ -148,7 +148,7 @@ class Any(Combination):
 
 
 class InOrder(Combination):
-    """Holds from the moment at which the last part holds, after each part has held after the one before."""
+    """Holds from the moment at which the last part holds, if the parts have held in order."""
 
     __slots__ = ()
 

@@ -19,7 +19,7 @@ class KeyKind(Enum):
     REGION = "region"  # name of a region
     NUMBER = "number"
     VECTOR = "vector"  # three numbers
-    NAME = "name"  # a text that is checked in the episode, such as the name of a joint
+    NAME = "name"  # a string that is checked in the episode, such as a joint name
 
 
 @dataclass(frozen=True, slots=True)

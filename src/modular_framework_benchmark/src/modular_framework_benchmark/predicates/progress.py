@@ -54,7 +54,7 @@ class Progress:
 
 
 def progress_of(milestones: Sequence[Milestone], stage: Stage) -> Progress:
-    """Returns the progress of an episode: a milestone counts if it holds at or after the moment of the one before.
+    """Returns the progress of an episode: a milestone counts if it holds when or after the previous milestone holds.
 
     Args:
         milestones: Milestones in their order.

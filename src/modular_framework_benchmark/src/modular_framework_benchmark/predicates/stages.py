@@ -55,7 +55,7 @@ class OperatorStage:
         """Asks the operator about each condition of some predicates at a moment.
 
         Args:
-            time_s: Moment, after all earlier ones [s since the start of the recording].
+            time_s: Moment, after all earlier moments [s since the start of the recording].
             predicates: Predicates that will be evaluated.
         """
         conditions = dict.fromkeys(condition for predicate in predicates for condition in predicate.conditions)
@@ -64,11 +64,11 @@ class OperatorStage:
 
     @property
     def times_s(self) -> Floats:
-        """Returns the moments at which the operator was asked, shape (n,) [s since the start of the recording]."""
+        """Returns the times of the operator's answers, shape (n,) [s since the start of the recording]."""
         return np.array(self._times_s)
 
     def satisfied(self, condition: Condition) -> Flags:
-        """Returns the operator's answers, shape (n,); false where the operator was not asked."""
+        """Returns the operator's answers, shape (n,); false if the operator was not asked."""
         return np.array([answers.get(condition, False) for answers in self._answers], dtype=bool)
 
     def found(self, condition: Condition) -> str:

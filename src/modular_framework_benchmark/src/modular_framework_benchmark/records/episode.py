@@ -58,7 +58,7 @@ class EpisodeStatus(Enum):
     FAILED = "failed"  # ended without success
     TIMED_OUT = "timed_out"  # exceeded the time limit
     BROKEN = "broken"  # the launch died or the measurement failed, which need not be the method's fault
-    INVALID = "invalid"  # interference with its judgement, or replaced software; a failure without figures
+    INVALID = "invalid"  # manipulated evaluation or replaced software; a failure without figures
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,11 @@ class PartKind(Enum):
     """Kind of a snapshot part, which decides how reports and comparisons use its values."""
 
     SOFTWARE = "software"  # decisive: equal in all episodes of an experiment
-    CONTENT = "content"  # decisive: equal in all episodes with the same levels that have the value
+    CONTENT = "content"  # decisive: equal in all episodes with the same levels, if recorded
     NOTE = "note"  # descriptive: listed, and compared between experiments
     SETTING = "setting"  # compared between experiments, not listed
-    MEASURED = "measured"  # summarised, neither listed nor compared
-    VARYING = "varying"  # differs between episodes by nature, neither listed nor compared
+    MEASURED = "measured"  # only summarised
+    VARYING = "varying"  # expected to differ between episodes; neither listed nor compared
 
 
 SETTINGS, REFERENCE = "settings", "reference_s"

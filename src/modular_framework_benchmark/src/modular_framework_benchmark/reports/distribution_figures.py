@@ -30,8 +30,8 @@ from modular_framework_benchmark.statistics.curves import Curve, performance_pro
 from modular_framework_benchmark.statistics.observations import EpisodeTable, metrics_of
 
 MAX_POINTS = 150  # drawn individually per method
-MIN_DISTINCT_VALUES = 3  # distinct values; a table shows fewer better
-MAX_LIMIT_RATIO = 2.0  # relative to the largest absolute value; a limit beyond would compress the values
+MIN_DISTINCT_VALUES = 3  # minimum number of distinct values; a table shows fewer values better
+MAX_LIMIT_RATIO = 2.0  # relative to the largest absolute value; a larger limit would compress the values
 
 Values = npt.NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
         row=1, col=1,
     )  # fmt: skip
     points = thinned(np.sort(values), MAX_POINTS)
-    jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # evenly spread and reproducible
+    jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # evenly spaced, so that the figure is reproducible
     figure.add_trace(
         go.Scatter(
             x=points, y=index + 0.2 + jitter, mode="markers", showlegend=False, name=name,

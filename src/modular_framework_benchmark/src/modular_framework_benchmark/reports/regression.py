@@ -41,7 +41,7 @@ _CHANGES = {
     Verdict.NOT_SHOWABLE: Change.NOT_SHOWABLE,
     Verdict.NO_DATA: Change.NO_DATA,
 }
-"""Change for a verdict whose first method is the later experiment."""
+"""Change, given the conclusion with the later experiment as the first method."""
 
 
 @dataclass(frozen=True, slots=True)

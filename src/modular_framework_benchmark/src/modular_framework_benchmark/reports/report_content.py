@@ -40,7 +40,7 @@ from modular_framework_benchmark.statistics.comparison import Analysis, MethodSu
 from modular_framework_benchmark.statistics.observations import metrics_of
 
 SUCCESS = "success"
-MAX_PAIRED_METHODS = 3  # methods whose pairs are drawn; more methods are ranked in one figure
+MAX_PAIRED_METHODS = 3  # maximum number of methods with one figure per pair; more methods are ranked in one figure
 COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # order of a pick; user components follow
 
 

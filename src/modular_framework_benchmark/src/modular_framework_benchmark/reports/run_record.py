@@ -27,12 +27,12 @@ MAX_NAMES = 12
 MAX_PARAMETERS = 400
 MAX_OTHERS_FRACTION = 0.1
 """Fraction of the machine used by other processes above which real times are doubtful."""
-_PER_EPISODE = ("seed", "trial", "number")  # differ between episodes by nature
+_PER_EPISODE = ("seed", "trial", "number")  # parts that are expected to differ between episodes
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedValue:
-    """A recorded value of the snapshots, such as a version.
+    """A value recorded in the snapshots, such as a version.
 
     Attributes:
         name: Path of keys: `versions.ompl`.
@@ -106,7 +106,7 @@ def warnings_of(
         verb = "is" if len(broken) == 1 else "are"
         found.append(
             f"{counted(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
-            f"{numbers}{more}). They count as failures; the comparisons name the verdicts that depend on them."
+            f"{numbers}{more}). They count as failures; the comparisons name the conclusions that depend on them."
         )
     return (*found, *_inconsistent(combinations), *_incidents(snapshots), *_load_warning(results, snapshots))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of a result database: those of OMPL's Planner Arena, and additional ones.
+"""Tables of a result database: the tables of OMPL's Planner Arena, and additional tables.
 
 Planner Arena shows every column of `runs` from the fourth as an attribute, and every column of `experiments` from the
 thirteenth as a filter. Metrics are therefore columns of `runs` and factors are columns of `experiments`; all other data

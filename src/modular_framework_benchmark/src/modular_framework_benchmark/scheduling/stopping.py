@@ -33,7 +33,7 @@ class TrialWatch:
         self._remaining: dict[int, int] = {}
         for spec in pending:
             self._remaining[spec.trial] = self._remaining.get(spec.trial, 0) + 1
-        self._is_due = rule is not None  # results of an earlier run may suffice
+        self._is_due = rule is not None  # the results of an earlier run may already be sufficient
         self._next_time = 0.0
 
     def ended(self, spec: EpisodeSpec) -> None:

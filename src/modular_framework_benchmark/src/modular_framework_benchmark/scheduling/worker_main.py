@@ -80,7 +80,7 @@ def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple
         if earlier:
             record = dataclasses.replace(record, snapshot={**record.snapshot, EARLIER_TRIES: earlier})
         return record, True
-    except Exception as error:  # a fault of mode or user code, which must not stop other episodes
+    except Exception as error:  # errors in mode or user code must not stop other episodes
         traceback.print_exc()
         with contextlib.suppress(Exception):
             runner.close()

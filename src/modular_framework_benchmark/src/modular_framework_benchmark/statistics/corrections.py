@@ -42,7 +42,7 @@ def holm_tarone(
 
 
 def _tarone_count(min_attainable: np.ndarray, level: float) -> int:
-    """Returns the smallest k such that at most k comparisons can attain a p value of level / k."""
+    """Returns the smallest k for which at most k comparisons can attain a p value of level / k."""
     counts = np.arange(1, len(min_attainable) + 1)
     attainable = np.searchsorted(np.sort(min_attainable), level / counts, side="right")
     return int(counts[attainable <= counts][0])

@@ -288,7 +288,7 @@ class EpisodeTable:
 def unmeasured_reason(results: ExperimentResults) -> str:
     """Returns the reason if every episode of every method ended for a cause outside the methods, otherwise "".
 
-    Such causes are a launch that died, a simulation that never became ready, a world that was changed from outside.
+    Examples of such causes: the launch died, the simulation never became ready, the world was changed from outside.
     """
     episodes = results.episodes
     if episodes.empty or not episodes["status"].isin([status.value for status in UNMEASURED_STATUSES]).all():

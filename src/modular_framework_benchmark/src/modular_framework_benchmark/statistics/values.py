@@ -57,7 +57,7 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
     Statistics 28 (2010) 453-468). It covers too little for a few units in two groups, so up to `MAX_WIDENED_UNITS`
     units the means that the sign flip test does not reject are added. It also covers too little if most units are
     equal, which gives a betting interval. If all values equal a bound, the other end is exact: a true mean beyond
-    `((1 - confidence) / 2) ** (1 / n)` of the range would give such values less often.
+    `((1 - confidence) / 2) ** (1 / n)` of the range would give these values less often.
 
     Args:
         means: Mean of each unit, shape (n,).

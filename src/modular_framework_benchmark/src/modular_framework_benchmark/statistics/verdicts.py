@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the conclusion of a comparison after the multiplicity correction: verdict, sentence and notes.
+"""Draws the conclusion of a comparison after the multiplicity correction: result, sentence and notes.
 
 A difference is shown only if the corrected p value is at most the error rate and the interval of the same statistic
 excludes 0. A fixed experiment claims nothing before its last episode.
@@ -67,7 +67,7 @@ def conclude(results: ExperimentResults, finding: Finding, correction: Correctio
 
 
 def unfinished(results: ExperimentResults) -> bool:
-    """Returns whether a fixed experiment has remaining episodes, so that a verdict would be an interim analysis."""
+    """Returns whether a fixed experiment has remaining episodes, so that a conclusion would be an interim analysis."""
     return len(results.episodes) < results.planned and not results.description.sequential
 
 
