@@ -183,7 +183,7 @@ class GripperActionController(Controller):
 
     def _end_goals(self, status: GoalStatus, text: str) -> None:
         self._running = False
-        if self._active is not None:  # a gripper at its goal keeps its grip, a moving gripper stops
+        if self._active is not None:  # a gripper at its goal keeps its grip; a moving gripper stops
             self._hold()
             self._apply(0.0)
         self._finish(status, self._state(False, False), text)

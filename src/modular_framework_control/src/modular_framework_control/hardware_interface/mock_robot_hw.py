@@ -70,7 +70,7 @@ class MockRobotHW(RobotHW):
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            if self._sent_period_s > 0.0:  # in a cycle of zero length the velocity stays
+            if self._sent_period_s > 0.0:  # a cycle of zero length does not change the velocity
                 state.velocity = (position - state.position) / self._sent_period_s
             state.position = position
 

@@ -131,8 +131,8 @@ class RobotHW:
     def fault(self) -> str:
         """Returns the reason why the hardware cannot follow commands (lost link, protective stop), or "".
 
-        This method runs in every cycle after `read`. The manager notifies the controllers of the joints, whose goals
-        end with this reason and which hold the joints until the reason is "".
+        This method runs in every cycle after `read`. The manager notifies the controllers of the joints. These
+        controllers end their goals with this reason and hold the joints until the reason is "".
         """
         return ""
 

@@ -75,7 +75,7 @@ class RobotHWConformance(ABC):
 
     @abstractmethod
     def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
-        """Returns initialized hardware at rest, with room to move for every joint.
+        """Returns initialized hardware at rest, with all joints away from their limits.
 
         Args:
             positions: Joint positions before initialization, by name and within the limits, for new hardware [rad|m];

@@ -90,8 +90,8 @@ class _Rate:
 class FourWheelSteeringController(MobileBaseController):
     """four_wheel_steering_controller/FourWheelSteeringController.
 
-    A command is a `BaseVelocity`, for which front and rear steer in opposite directions, or a `SteeringCommand`; the
-    last command of either type is active.
+    A command is a `BaseVelocity` (front and rear steer in opposite directions) or a `SteeringCommand`; the last
+    command of either type is active.
 
     Parameters, in addition to MobileBaseController: `front_wheel`, `rear_wheel`, `front_steering`, `rear_steering`, two
     joints each, left joint first; `track`, `wheel_base`, `wheel_radius` and `wheel_steering_y_offset` [m], by default
@@ -164,7 +164,7 @@ class FourWheelSteeringController(MobileBaseController):
         return due
 
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        if command is None and self._steering is not None:  # come to rest without changing the curve
+        if command is None and self._steering is not None:  # brake without changing the steering
             command = replace(self._steering, speed=0.0)
         self._steering = command if isinstance(command, SteeringCommand) else None
         if self._steering is not None:

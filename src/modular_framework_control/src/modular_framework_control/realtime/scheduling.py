@@ -56,8 +56,8 @@ def run_in_real_time(priority: int = PRIORITY, others_priority: int = OTHERS_PRI
     and other processes could preempt this thread.
 
     Args:
-        priority: Priority of the calling thread, 1 to 99; a process that serves the control loop uses lower priorities
-            than the threads of the loop's process.
+        priority: Priority of the calling thread, 1 to 99; helper processes of the control loop should use lower
+            priorities than the loop's process.
         others_priority: Priority of the other threads, 1 to 99.
 
     Returns:
@@ -85,14 +85,14 @@ def run_in_real_time(priority: int = PRIORITY, others_priority: int = OTHERS_PRI
 
 
 def leave_real_time() -> None:
-    """Returns all threads of this process to ordinary scheduling; call at rest, because shutdown needs much time."""
+    """Restores ordinary scheduling of all threads, so that a long shutdown does not block other processes."""
     for thread in map(int, os.listdir("/proc/self/task")):
         with contextlib.suppress(OSError):  # the thread has ended
             os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
 
 
 def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
-    """Prevents deep sleep states of idle processors for the lifetime of this process, which costs power.
+    """Disables deep sleep states of idle processors until this process ends, at the cost of power.
 
     Args:
         latency_device: The kernel's device for latency requests.
@@ -105,8 +105,8 @@ def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
         os.write(device, (0).to_bytes(4, sys.byteorder))
     except OSError as error:
         return [
-            f"idle processors kept awake ({latency_device}: {error.strerror}; allow to write it with a rule of "
-            f"udev, or docker run --device {latency_device})"
+            f"idle processors kept awake ({latency_device}: {error.strerror}; allow write access with "
+            f"a udev rule, or docker run --device {latency_device})"
         ]
     return []
 

@@ -144,5 +144,5 @@ class ControllerManagerClient:
 
 
 def _simulation_is_starting() -> bool:
-    """Returns whether simulated time has not started yet, such as while a large world is being loaded."""
+    """Returns whether simulated time has not started yet, for example while a large world is loaded."""
     return not rospy.rostime.is_wallclock() and rospy.get_rostime().is_zero()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Receives large messages in pieces, so that the control loop never waits long for Python's interpreter lock.
+"""Receives large messages in chunks, so that the control loop never waits long for Python's interpreter lock.
 
 rospy copies a received message and frees its buffer in single calls, which hold the interpreter lock for milliseconds
 if the message is large.
@@ -21,7 +21,7 @@ _MMAP_THRESHOLD_BYTES = 1 << 20
 
 
 class ReceiveBuffer:
-    """Stores the bytes received by a connection piece by piece; replaces rospy's BytesIO."""
+    """Stores the received bytes of a connection in chunks; replaces rospy's BytesIO."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -75,7 +75,7 @@ class ReceiveBuffer:
 
 
 def receive_in_pieces() -> None:
-    """Makes all later connections of this process receive large messages in pieces.
+    """Makes all later connections of this process receive large messages in chunks.
 
     The C library keeps the freed memory: returning it to the system would interrupt every processor of the process.
     """

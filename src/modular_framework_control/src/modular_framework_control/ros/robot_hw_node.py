@@ -254,7 +254,7 @@ class RobotHwNode:
             manager.connect()
             self._connected.set()
             self._readiness.announce()
-        except Exception as error:  # otherwise the node would run without services and without a message
+        except Exception as error:  # otherwise the node would run without services and without an error message
             if not rospy.is_shutdown():
                 self._failure = str(error) or type(error).__name__
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())

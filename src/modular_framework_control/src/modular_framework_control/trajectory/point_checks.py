@@ -20,7 +20,7 @@ from modular_framework_control.trajectory.joint_trajectory import (
     chunks,
 )
 
-MAX_VALUE = 1e9  # keeps the coefficients of the shortest segments finite
+MAX_VALUE = 1e9  # shorter segments would have infinite coefficients
 _MAX_FAULTS_LISTED = 8
 _NOUNS = ("position", "velocity", "acceleration")
 
@@ -102,7 +102,7 @@ class _Faults:
         self._listed: list[str] = []
 
     def add(self, count: int, texts: Iterator[str]) -> None:
-        """Adds `count` faults; descriptions are only taken from `texts` as far as needed."""
+        """Adds `count` faults and takes only the required descriptions from `texts`."""
         self.count += count
         self._listed += islice(texts, _MAX_FAULTS_LISTED - len(self._listed))
 

@@ -28,8 +28,9 @@ FOLLOWING_FRACTION = 0.1
 """Maximum relative velocity error of a joint that counts as following. Its ramp begins at the desired velocity, because
 measured velocities are delayed and noisy."""
 SHARP_BRAKING_FRACTION = 0.9
-"""Fraction of the maximum deceleration for a stop without a ramp. The reserve lets a lagging joint catch up without
-overshooting the end of the stop."""
+"""Fraction of the maximum deceleration for a stop without a ramp.
+
+The reserve prevents overshooting of a lagging joint."""
 RAMP_PEAK_FACTOR = 1.5
 """Peak deceleration of a ramp as a multiple of the mean deceleration."""
 
