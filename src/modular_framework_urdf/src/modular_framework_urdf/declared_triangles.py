@@ -109,7 +109,7 @@ def _ply(content: bytes) -> int:
 def _ply_text(words: list[bytes], elements: list[tuple[str, int, list[list[str]]]]) -> int:
     offset = triangles = 0
     for name, count, properties in elements:
-        if all(item[0] != "list" for item in properties):  # skips the element; a header may declare any count
+        if all(item[0] != "list" for item in properties):  # the declared count may be arbitrarily large
             offset += count * len(properties)
             continue
         for _ in range(count):

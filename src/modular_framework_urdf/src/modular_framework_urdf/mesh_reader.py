@@ -111,7 +111,7 @@ def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArr
             content, names = keep_obj_part(content, part)
             _require_part(path, part, names)
         declared = declared_triangles(kind, content)
-        if kind == "stl" and is_binary_stl(content):  # common case without trimesh, whose import takes 0.6 s
+        if kind == "stl" and is_binary_stl(content):  # the common case needs no trimesh, whose import takes 0.6 s
             return declared, 1.0, *_corners(np.frombuffer(content, BINARY_STL, offset=STL_HEADER)["corners"])
         return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)
     except MeshError:

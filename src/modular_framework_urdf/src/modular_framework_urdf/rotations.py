@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rotations as quaternions xyzw and as roll, pitch and yaw: rotations about the fixed axes x, then y, then z [rad].
 
-Implemented without SciPy, whose import delays the start of every node by 0.3 s and whose single rotations take ten
-times as long; the simulation composes thousands of rotations per second. Tested against SciPy.
+Implemented without SciPy: its import delays the start of every node by 0.3 s, and its single rotations take ten times
+as long. The simulation composes thousands of rotations per second. Tested against SciPy.
 """
 
 from __future__ import annotations

@@ -323,7 +323,7 @@ class ArmCommander:
             return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
 
     def contacts(self, joints: Mapping[str, float], start: StartState = None) -> str:
-        """Returns the collisions at given joint positions, in words.
+        """Returns the collisions at given joint positions, as text.
 
         Args:
             joints: {joint: position} [rad or m].

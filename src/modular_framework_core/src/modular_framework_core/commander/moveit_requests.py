@@ -107,6 +107,6 @@ def joints_of(state: JointState, names: Sequence[str]) -> dict[str, float]:
 
 
 def describe_pose(pose: PoseStamped) -> str:
-    """Returns a position in words, for error messages."""
+    """Returns a position as text for error messages."""
     p = pose.pose.position
     return f"({p.x:.3f}, {p.y:.3f}, {p.z:.3f}) m in frame '{pose.header.frame_id}'"

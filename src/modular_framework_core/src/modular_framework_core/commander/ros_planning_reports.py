@@ -12,8 +12,8 @@ from std_msgs.msg import String
 from modular_framework_ros.calls import wait_until
 
 REPORT_TOPIC = "move_group/planning_report"
-REPORT_WAIT_S = 2.0  # for a report on a busy machine, if a publisher of reports is connected
-UNKNOWN_REPORTER_WAIT_S = 0.3  # if no publisher of reports is connected
+REPORT_WAIT_S = 2.0  # wait for a report if a publisher is connected; long enough for a busy machine
+UNKNOWN_REPORTER_WAIT_S = 0.3  # wait for a report if no publisher is connected
 MAX_REPORTS = 64
 
 

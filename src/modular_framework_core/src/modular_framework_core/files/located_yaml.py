@@ -76,7 +76,7 @@ Node = Union[Scalar, Sequence, Mapping]  # noqa: UP007 - the classes above refer
 
 
 def kind_of(node: Node) -> str:
-    """Returns the kind of a value in words, for messages."""
+    """Returns a description of a value's type for messages."""
     match node:
         case Mapping():
             return "a mapping"

@@ -14,7 +14,7 @@ import yaml
 from modular_framework_core.files import shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
 
-_NODE_LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries convert the text themselves, without tags
+_NODE_LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # values stay text; each entry converts its values
 Parsed = TypeVar("Parsed")
 
 
@@ -111,7 +111,7 @@ class Entry:
 
 
 def describe(node: yaml.Node) -> str:
-    """Returns the kind of a YAML node in words, for messages."""
+    """Returns a description of a YAML node's type for messages."""
     match node:
         case yaml.MappingNode():
             return "a mapping"

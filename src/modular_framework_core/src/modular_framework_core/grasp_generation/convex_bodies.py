@@ -25,7 +25,7 @@ MESH_TOLERANCE_M = 1.0e-3
 
 
 class ShapeError(ValueError):
-    """A collision shape cannot be used; the text is the reason, as a predicate."""
+    """A collision shape is unusable; the message completes a sentence whose subject is the shape."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def convex_hull(points: Array, tolerance_m: float = 0.0) -> ConvexBody:
 def collision_body(collision: PlacedShapes) -> ConvexBody:
     """Returns the convex body of a URDF collision element in the frame of the shape.
 
-    A cylinder or sphere is enclosed by a polyhedron with 24 sides around. A mesh is enclosed by its convex hull with a
+    A cylinder or sphere is enclosed by a polyhedron with 24 sides. A mesh is enclosed by its convex hull with a
     tolerance of 1 mm.
 
     Raises:

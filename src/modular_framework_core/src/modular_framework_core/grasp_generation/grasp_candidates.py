@@ -66,7 +66,7 @@ class GraspCandidate:
 
 
 class NoCandidatesError(RuntimeError):
-    """A method finds no grasp of an object; the text is the cause, which follows "no part ... can be grasped ...: "."""
+    """A method finds no grasp; the message is the cause, which follows "no part ... can be grasped ...: "."""
 
 
 class ReadNumber(Protocol):
@@ -121,5 +121,5 @@ class SeeingMethod(Protocol):
             seed: Seed of all random numbers.
 
         Raises:
-            NoCandidatesError: No object is detected; the text is the cause.
+            NoCandidatesError: No object is detected; the message gives the cause.
         """

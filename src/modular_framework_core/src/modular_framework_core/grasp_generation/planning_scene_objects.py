@@ -47,7 +47,7 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True)
 class CropBox:
-    """Search volume for objects: a box along the axes of the planning frame.
+    """Search volume for objects: an axis-aligned box in the planning frame.
 
     Attributes:
         low: Minimum x, y, z [m].

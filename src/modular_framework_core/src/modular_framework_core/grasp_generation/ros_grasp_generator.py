@@ -120,7 +120,7 @@ class GraspGenerator:
             raise NoGraspError(str(error)) from error
         if isinstance(self._method, SeeingMethod):
             self._method.connect()
-        # advertised last, because clients that see this topic expect a fast response of the services
+        # advertised last, because clients take this topic as a sign that the services are ready
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._services = [
             rospy.Service(name, Trigger, lambda _, kept=kept: self._on_demand(kept)) for name, kept in SERVICES.items()
@@ -129,8 +129,8 @@ class GraspGenerator:
     def watch(self) -> None:
         """Generates grasps for each new or moved object until ROS shuts down.
 
-        With ``/wait_for_planning``, the node generates once, and afterwards only on request, because the time at which
-        it reads the scene would otherwise depend on the load of the machine. If the task waits for its start, the node
+        With ``/wait_for_planning``, the node generates once, and afterwards only on request. Otherwise the time at
+        which it reads the scene would depend on the load of the machine. If the task waits for its start, the node
         generates only on request: the client that starts the task requests grasps first, and a second generation would
         slow down the measured generation. The node waits at most ``~scene_timeout`` of the ROS clock for a missing
         object or for a service that does not respond.
@@ -383,7 +383,7 @@ def _work(method: GraspMethod, codes: list[int]) -> None:
         generator = GraspGenerator(method)
         generator.connect()
         generator.watch()
-    except Exception as error:  # any error must end the node; otherwise the node would stay without a function
+    except Exception as error:  # any error must end the node, which could do nothing useful afterwards
         if not rospy.is_shutdown():
             codes.append(1)
             rospy.logfatal(

@@ -22,7 +22,7 @@ WARNING_PERIOD_S = 30.0
 
 
 class NoGraspError(RuntimeError):
-    """No grasp is available; the text is the reason."""
+    """No grasp is available; the message gives the reason."""
 
 
 class NoObjectError(NoGraspError):

@@ -95,7 +95,7 @@ class GraspServer:
             else:
                 rospy.logerr("Grasp command: %s", error)
                 handle.set_aborted(GraspResult(), str(error))
-        except Exception as error:  # a client must never wait for a goal whose thread died
+        except Exception as error:  # a client must get a result even if the thread of the goal has died
             rospy.logerr("Grasp command: unexpected %r", error)
             handle.set_aborted(GraspResult(), f"internal error: {error!r}")
         finally:

@@ -176,7 +176,7 @@ class Manipulator(Protocol):
         """Moves the fingers and waits for the end of the motion.
 
         Raises:
-            GraspCommandError: The motion failed or was stopped; the text is the reason.
+            GraspCommandError: The motion failed or was stopped; the message gives the reason.
             CallError: Another node did not respond.
         """
 

@@ -33,8 +33,8 @@ GC_THRESHOLD = 50_000  # [objects]; messages have no reference cycles, and five 
 def start(node_name: str) -> list[str]:
     """Starts a node and returns its command-line arguments without ROS remappings.
 
-    If ``/rosout_disable_topics_generation`` is not set, it is set to its default: rospy otherwise asks the master for
-    it at every log message, which takes half the time of a request.
+    Sets ``/rosout_disable_topics_generation`` to its default if unset: rospy otherwise queries the master at every log
+    message, which takes half the time of a request.
     """
     rospy.init_node(node_name)
     if not rospy.has_param(TOPICS_IN_LOG_PARAMETER):

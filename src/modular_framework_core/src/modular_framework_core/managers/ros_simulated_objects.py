@@ -26,7 +26,8 @@ def remove_deleted_objects(remove_missing: Callable[[Collection[str]], list[str]
     """Removes the objects deleted from the simulation, if the parameter ``simulation`` is true; logs every failure.
 
     Args:
-        remove_missing: Function that keeps the objects of the given models and returns the names of those removed.
+        remove_missing: Function that removes the objects whose model is not among the given models, and returns the
+            removed names.
         store: Name of the store, for messages.
     """
     if rospy.get_param(SIMULATION_PARAMETER, False) is not True:

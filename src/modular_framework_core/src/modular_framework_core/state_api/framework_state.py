@@ -41,7 +41,7 @@ class FrameworkState(smach.State):
         DEFAULT_IO_KEYS: Default of ``io_keys``.
         outcomes: Outcomes in declared order.
         reason: Reason why the last execution did not succeed; "" after a success or before the first execution.
-        feedback: Current activity in words, which a running state may set for viewers of the task.
+        feedback: Description of the current activity, which a running state may set for viewers of the task.
     """
 
     DEFAULT_IO_KEYS: ClassVar[tuple[str, ...]] = ()
@@ -123,7 +123,7 @@ class FrameworkState(smach.State):
         return outcome
 
     def stop_requested(self) -> bool:
-        """Returns whether this state or the task was asked to stop."""
+        """Returns whether a stop of this state or of the task was requested."""
         return bool(self.preempt_requested()) or smach.is_shutdown()
 
     def stopped(self) -> str:

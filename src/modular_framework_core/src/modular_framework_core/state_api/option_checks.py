@@ -88,7 +88,7 @@ def _fault(allowed: OptionType, value: Any) -> str:
         return ""
     try:
         fault = option_fault(allowed, _node(value))
-    except (_NoTaskValueError, RecursionError):  # the latter for a list that contains itself
+    except (_NoTaskValueError, RecursionError):  # RecursionError for a list that contains itself
         return ""
     return "" if fault is None else fault[1]
 

@@ -16,7 +16,7 @@ class Anything:
     """Any value, for options without a known type."""
 
     def describe(self) -> str:
-        """Returns the allowed values in words."""
+        """Returns a description of the allowed values."""
         return "any value"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:

@@ -23,7 +23,7 @@ class MachineKey:
 
     Attributes:
         name: Spelling.
-        form: Form of the value, in words.
+        form: Description of the value's form.
         meaning: Purpose of the key.
         schema: JSON Schema of the value.
         at_root: Use in the task's own header: "required", "optional" or "" (not allowed).

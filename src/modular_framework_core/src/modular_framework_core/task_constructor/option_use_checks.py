@@ -88,7 +88,7 @@ class _Checker:
         for option in source.options.values():
             node = self._state.nodes.get(option.name)
             if node is not None and option_fault(option.type, node):
-                continue  # already reported; further faults would only be consequences
+                continue  # already reported; further faults would only follow from this fault
             value = option.default if node is None else node.plain()
             for use in option.uses:
                 self._check_use(use, option.name, value, node)
@@ -214,7 +214,7 @@ def _stored_names(states: list[StateSpec]) -> dict[str, frozenset[str]]:
 def _undeclared_texts(states: list[StateSpec]) -> Iterator[str]:
     """Yields the texts in options whose annotations declare no name.
 
-    A state may store a message under such a text: a user's own state, or a state that calls a service with the text.
+    User states, and states that call services, may store messages under such names.
     """
     for state in states:
         for name, node in state.nodes.items():

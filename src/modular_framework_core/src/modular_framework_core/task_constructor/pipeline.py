@@ -103,7 +103,7 @@ def main(arguments: Sequence[str], planners_of: Callable[[str], PlannerNames | N
         args.states, args.templates = (
             directories_from(str(args.script)),
             args.states,
-        )  # without a script, the positional arguments move up
+        )  # without a script, the first positional argument is the next parameter
     if args.script is None and not args.explain and not args.schema:
         parser.error("the script is missing; only --explain and --schema work without one")
     try:

@@ -87,7 +87,7 @@ def _import_fault(name: str, file: Path) -> str:
 def _top_level_spec(name: str) -> ModuleSpec | None:
     try:
         return importlib.util.find_spec(name)
-    except ValueError:  # loaded, but of unknown origin
+    except ValueError:  # the module is loaded, but its origin is unknown
         return ModuleSpec(name, None)
 
 

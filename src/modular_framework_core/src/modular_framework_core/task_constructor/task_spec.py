@@ -53,7 +53,7 @@ class MachineSpec:
         transitions: Outcome -> label or outcome of the enclosing machine; empty for the root and in a concurrence.
         shares_userdata: Whether the machine uses the enclosing machine's userdata.
         default_outcome: Outcome of a concurrence if no entry of the outcome map matches; None for other machines.
-        outcome_map: For a concurrence, outcome -> {label: outcome of that child}.
+        outcome_map: For a concurrence, outcome -> {child label: child outcome}.
         input_keys: Userdata keys copied from the enclosing machine.
         output_keys: Userdata keys copied to the enclosing machine.
         initial_state: Label of the initial state; "" for the first child.

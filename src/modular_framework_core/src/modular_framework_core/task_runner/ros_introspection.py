@@ -35,7 +35,7 @@ def with_introspection(name: str, factory: Callable[[], smach.Container]) -> Cal
 
     def make_and_publish() -> smach.Container:
         machine = factory()
-        # delayed in a thread, because advertising needs several calls to the master and would delay the first state
+        # runs in a thread, because advertising takes several calls to the master and would delay the first state
         thread = threading.Thread(target=_start_server, args=(machine, name), name="task introspection", daemon=True)
         thread.start()
         return machine

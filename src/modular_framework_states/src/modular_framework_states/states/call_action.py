@@ -39,8 +39,8 @@ class CallAction(FrameworkState):
         action_name: Name of the action; its type is determined when the action is available.
         goal: Field to value, nested like the goal; other fields keep their default.
         expect: Field to expected value of the result, nested like the result.
-        outcome_field: Field of the result that selects the outcome: true the first outcome, false the last, an integer
-            the outcome at that index, a string the outcome with that name. The field also selects the outcome of an
+        outcome_field: Field of the result that selects the outcome: true for the first outcome, false for the last, an
+            integer for an index, a string for a name. The field also selects the outcome of an
             aborted goal, which is never the first.
         outcome_values: Outcome to the value, or list of values, of that field; any other value is a failure.
         keep: Userdata key to the result field stored there; the keys must be output keys.

@@ -37,8 +37,8 @@ class CallService(FrameworkState):
         service_name: Name of the service; its type is determined when the service is available.
         request: Field to value, nested like the request; other fields keep their default.
         expect: Field to expected value of the response, nested like the response.
-        outcome_field: Field of the response that selects the outcome instead of ``success`` or ``ok``: true the first
-            outcome, false the last, an integer the outcome at that index, a string the outcome with that name.
+        outcome_field: Field of the response that selects the outcome instead of ``success`` or ``ok``: true for the
+            first outcome, false for the last, an integer for an index, a string for a name.
         outcome_values: Outcome to the value, or list of values, of that field; any other value is a failure.
         keep: Userdata key to the response field stored there; the keys must be output keys.
         timeout: Maximum wait for the service, and then for its response [s].

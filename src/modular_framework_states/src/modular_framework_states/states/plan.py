@@ -24,8 +24,8 @@ StartName = Annotated[str, Named("option:starting_state_type", userdata=True)]
 class Plan(FrameworkState):
     """Plans an arm motion and stores the plan.
 
-    Target poses are converted to the joint positions nearest to the start of the plan, so that plans made at the same
-    time fit together (see ``grasp_stages``). At the start stage of a grasp, the fingers have the pregrasp posture.
+    Target poses are converted to the joint positions nearest to the start of the plan, so that concurrent plans fit
+    together (see ``grasp_stages``). At the start stage of a grasp, the fingers have the pregrasp posture.
 
     Args:
         target_state_type: Pose, joint_state, grasp, pregrasp or postgrasp.

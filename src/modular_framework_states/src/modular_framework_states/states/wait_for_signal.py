@@ -28,7 +28,7 @@ class WaitForSignal(FrameworkState):
     execution. A component may give the reason of a False on ``<topic_name>/reason`` (std_msgs/String).
 
     A latched signal may come from an earlier task. A component that offers the service ``<topic_name>/renew``
-    (std_srvs/Trigger) is asked to make the signal true again; its response replaces the signal.
+    (std_srvs/Trigger) is called to renew the signal; its response replaces the signal.
 
     A component that has not yet published the topic has the time of the parameter ``/start_timeout`` to start;
     `timeout` counts from then.
