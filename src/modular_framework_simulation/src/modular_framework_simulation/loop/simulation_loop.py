@@ -230,7 +230,7 @@ class SimulationLoop:
         self.pacer.keep(self._time_s(), idle, calm, still=idle and calm and self._actors is not None)
 
     def _stand_still(self) -> None:
-        """Lets the controllers accept goals while time is held; the first call also publishes the current state."""
+        """Makes the controllers accept goals while time is held; the first call also publishes the current state."""
         now_s, first = self._time_s(), self._held_at != self.world.steps
         if first:
             self._held_at = self.world.steps

@@ -27,7 +27,7 @@ class ModelSnapshot:
 
     Attributes:
         name: Name of the model in the world.
-        instance: Unique number of the model in this run, which changes if a model is deleted and spawned again.
+        instance: Number that is unique in this run; a model that is deleted and spawned again gets a new number.
         static: Whether the model never moves.
         links: Links with collision shapes.
     """
@@ -57,7 +57,7 @@ class HeldObject:
 
 @dataclass(frozen=True, slots=True)
 class WorldSnapshot:
-    """State of the models and grasps at one time.
+    """State of the models and grasps at one instant.
 
     Attributes:
         time_s: Simulated time [s].
@@ -75,19 +75,23 @@ class WorldSnapshot:
 
 
 def take_snapshot(
-    world: PhysicsWorld, held: tuple[HeldObject, ...], before: WorldSnapshot | None = None
+    world: PhysicsWorld, held: tuple[HeldObject, ...], previous: WorldSnapshot | None = None
 ) -> WorldSnapshot:
     """Copies the state of the world; must be called from the loop's thread.
 
     Args:
         world: World of the models.
         held: Objects held by the grippers.
-        before: Last snapshot, at most REST_LOOK_S old; sleeping models are copied from the snapshot, although a model
-            may have been touched since. None copies the current state of every model.
+        previous: Last snapshot; if recent, the states of sleeping models are copied from this snapshot. None copies the
+            current state of every model.
     """
-    if before is not None and before.revision == world.revision and 0 <= world.time_ns - before.time_ns <= _MAX_AGE_NS:
+    if (
+        previous is not None
+        and previous.revision == world.revision
+        and 0 <= world.time_ns - previous.time_ns <= _MAX_AGE_NS
+    ):
         moving = world.moving()
-        models = tuple(_copy(world, model.name) if model.name in moving else model for model in before.models)
+        models = tuple(_copy(world, model.name) if model.name in moving else model for model in previous.models)
     else:
         models = tuple(_copy(world, name) for name, body in world.bodies.items() if body.spec is not None)
     return WorldSnapshot(world.time_ns * 1e-9, models, held, world.time_ns, world.revision)

@@ -153,7 +153,7 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
                 "free disk space, or set ROS_HOME to a folder on another disk",
             ) from error
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)  # renamed already if all went well
+        shutil.rmtree(scratch, ignore_errors=True)  # missing after a success, which has renamed the folder
 
 
 def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:

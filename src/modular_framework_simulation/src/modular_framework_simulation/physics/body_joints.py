@@ -12,7 +12,7 @@ from modular_framework_simulation.physics.simulated_body import JointSettings, S
 
 @dataclass(frozen=True, slots=True)
 class JointMeasurement:
-    """State of a movable joint at one time.
+    """State of a movable joint at one instant.
 
     Attributes:
         position: Position [rad or m].

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A step of MuJoCo with the contacts and motors of PyBullet and Gazebo.
+"""Time step of MuJoCo with contact and motor models as in PyBullet and Gazebo.
 
 MuJoCo solves for accelerations as close to reference accelerations as the bounds of the forces allow. For a contact or
-a joint with dry friction, the reference is to come to rest. Between MuJoCo's own functions, `step` changes the
+a joint with dry friction, the reference acceleration stops the motion. Between MuJoCo's own functions, `step` changes
+the
 following:
 
 - A contact uses the smaller coefficients of its two surfaces (MuJoCo uses the larger coefficients).
 - Every reference is reached within one step, except the fraction of penetrations given by `PhysicsSettings`.
 - Bouncing surfaces have a reference velocity in proportion to the impact velocity (MuJoCo has no restitution).
-- A motor is dry friction relative to the motor's velocity, so that its maximum effort is exact and the solver treats
-  the motor and the contacts of the moved links together.
+- A motor is modelled as dry friction relative to its target velocity, so that its effort limit is exact and the solver
+handles motors and contacts together.
 """
 
 from __future__ import annotations
@@ -44,13 +45,14 @@ _DISABLED = (
 )
 
 _NOSLIP_ITERATIONS = 3
-"""Solver passes over the friction forces without softness, which prevent held objects from creeping."""
+"""Number of solver passes without constraint softness; these passes prevent creep of held objects."""
 
-_FREE_VELOCITY_LOSS = 1e3
-"""Velocity loss in a step [m/s] that no contact needs to prevent."""
+_OPEN_CONTACT_VELOCITY_DROP = 1e3
+"""Velocity drop that an open contact allows in a step [m/s]; so large that no force acts before the impact."""
 
 _MIN_FRICTION = 1e-5
-"""Minimum coefficient for MuJoCo's divisions; contacts with a smaller coefficient have no friction of this kind."""
+"""Minimum friction coefficient, because MuJoCo divides by coefficients; a smaller coefficient disables this type of
+friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,8 @@ class MujocoDynamics:
         options.iterations, options.noslip_iterations = settings.solver_iterations, _NOSLIP_ITERATIONS
         options.cone, options.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
         options.integrator = mujoco.mjtIntegrator.mjINT_EULER
-        # Joint damping is explicit, as computed by `joint_resistance`; islands would copy references too early.
+        # Joint damping is explicit, computed by `joint_resistance`; with islands, MuJoCo would copy the references
+        # before they are set.
         options.disableflags = sum(int(each) for each in _DISABLED)
 
     def mark_moved(self) -> None:
@@ -239,7 +242,7 @@ class MujocoDynamics:
         bouncing = np.flatnonzero((fractions > 0.0) & (data.contact.efc_address >= 0))
         rows = data.contact.efc_address[bouncing]
         apart = rows[data.efc_pos[rows] > 0.0]
-        references[apart] = data.efc_vel[apart] - _FREE_VELOCITY_LOSS  # no braking before the impact
+        references[apart] = data.efc_vel[apart] - _OPEN_CONTACT_VELOCITY_DROP  # no braking before the impact
         fast = data.efc_vel[rows] < -self.settings.bounce_threshold
         fast &= data.efc_pos[rows] <= 0.0
         references[rows[fast]] = -fractions[bouncing[fast]] * data.efc_vel[rows[fast]]
@@ -247,7 +250,7 @@ class MujocoDynamics:
     def _measure_loads(self) -> None:
         model, data = self.model, self.data
         mujoco.mj_rnePostConstraint(model, data)
-        torques, forces = data.cfrc_int[:, :3], data.cfrc_int[:, 3:]  # on each body, about its tree's centre of mass
+        torques, forces = data.cfrc_int[:, :3], data.cfrc_int[:, 3:]  # about the centre of mass of each tree
         levers = data.subtree_com[model.body_rootid] - data.xpos
         axes = data.xmat.reshape(-1, 3, 3)
         self._forces = np.einsum("bji,bj->bi", axes, forces)

@@ -207,7 +207,7 @@ class PhysicsEngine(ABC):
         """Returns the state of all bodies, which `restore_state` can restore while the bodies are the same.
 
         Raises:
-            SimulationError: The engine lets bodies sleep (`rest_speed`), which is not part of its state.
+            SimulationError: Sleeping bodies are enabled (`rest_speed`), and the engine's state does not include them.
         """
 
     @abstractmethod

@@ -49,7 +49,7 @@ class PhysicsSettings:
             seconds is not computed until a moving body touches it, a force acts on it, or a request changes the world;
             0 disables sleeping. Most objects of a world are at rest, and each costs 15 us per step. The solver leaves
             objects at rest with up to 0.002 rad/s; a starting slip exceeds the value within two seconds, if ever. Only
-            PyBullet lets objects sleep.
+            PyBullet supports sleeping objects.
     """
 
     time_step_ns: int = 2_000_000

@@ -111,8 +111,8 @@ class PyBulletEngine(PhysicsEngine):
             )
         self._forget_bodies()
         self._impossible_moments: dict[int, dict[int, list[float]]] = {}  # by body and link
-        self._free_masses: dict[int, float] = {}  # of bodies without joints [kg]
-        self._iterations_fit = True  # to the masses; fitted before a step, not for each of many new bodies
+        self._free_masses: dict[int, float] = {}  # masses of bodies without joints [kg]
+        self._iterations_fit = True  # whether the solver iterations match the masses
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)

@@ -57,16 +57,16 @@ class Rest:
         self._woken: dict[int, int] = {}  # movable bodies that can sleep, with the step of the last wake-up
         self._jointed: list[int] = []
         self._never_move: set[int] = set()
-        self._slept: set[int] = set()  # asleep at the last check
-        self._known: set[int] = set()  # asleep at the last two checks
+        self._slept: set[int] = set()  # bodies asleep at the last check
+        self._known: set[int] = set()  # bodies asleep at the last two checks
         self._steps = 0
         self._waking: set[int] = set()
         self._lost: list[tuple[int, Callable[[], None]]] = []
-        self._inside: set[int] = set()  # movable bodies that can sleep and are not stored
-        self._loaded: set[int] = set()  # brought back since the last step
+        self._inside: set[int] = set()  # movable bodies that can sleep, except stored bodies
+        self._loaded: set[int] = set()  # bodies restored since the last step
         self._watched: set[int] = set()  # contacts of these bodies are read
         self._corners: dict[tuple[int, int], tuple[Any, Any]] = {}  # at the last check, by body and link
-        self._checked = 0  # step of this check
+        self._checked = 0  # number of the step of this check
         self._may_approach = False  # the next step needs a check
 
     def adjust(self, settings: PhysicsSettings) -> None:
@@ -145,7 +145,7 @@ class Rest:
             self._jointed.remove(body)
 
     def _change(self, body: int, activation: int) -> None:
-        threshold = self._settings.rest_speed**2  # of the sum of the squared velocities
+        threshold = self._settings.rest_speed**2  # minimum of the sum of the squared velocities
         self._api.changeDynamics(
             self.body_id(body),
             BASE_INDEX,

@@ -2,7 +2,7 @@
 """Bodies at rest outside of PyBullet, whose step costs about 1 us for every body, even for a sleeping body.
 
 A stored body is removed from the engine and loaded again later, at the same pose and with the same properties. The
-engine gives a loaded body a new id, so the rest of the simulation uses numbers that do not change.
+engine gives a reloaded body a new id, so all other modules use ids that do not change.
 """
 
 from __future__ import annotations

@@ -313,7 +313,7 @@ class RobotBody:
         return complete
 
     def _limit_self_collisions(self) -> None:
-        """Enables self-collisions between fingers only, because the planner checks the rest of the robot.
+        """Enables self-collisions between fingers only, because the planner checks all other links.
 
         Links of the same finger never collide, because the bars of a linkage overlap at the hinges.
         """

@@ -16,7 +16,7 @@ _CHECK_PERIOD_S = 0.1
 
 
 class WorldRest:
-    """Detects rest of a world: all velocities are 0 after two consecutive steps, so all accelerations are 0 too.
+    """Detects rest of a world: all velocities are 0 after two consecutive steps, so all accelerations are also 0.
 
     The world stays at rest until `disturb` reports an external change: a force, a command, or a change of a model.
 
@@ -32,7 +32,7 @@ class WorldRest:
         """Whether the world is at rest."""
 
     def disturb(self) -> None:
-        """Ends the rest, so that the following steps are computed."""
+        """Marks the world as moving, so that the following steps are computed."""
         self._steps, self._was_still, self.holds = 0, False, False
 
     def after_step(self, bodies: Iterable[SimulatedBody]) -> None:

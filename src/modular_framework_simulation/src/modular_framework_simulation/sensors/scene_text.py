@@ -47,7 +47,7 @@ class VisibleModel:
 
 @dataclass(frozen=True, slots=True)
 class ScenePoses:
-    """Poses of all visible links at one time.
+    """Poses of all visible links at one instant.
 
     Attributes:
         time_ns: Simulated time [ns].

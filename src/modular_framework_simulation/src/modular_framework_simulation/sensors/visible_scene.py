@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracks the visual shapes of all models and their poses at one time, for cameras.
+"""Tracks the visual shapes of all models and their current poses, for cameras.
 
 The tracker runs in the loop's thread and copies all changes. The copies are sent to the renderer's process, which draws
 while the physics continues.
