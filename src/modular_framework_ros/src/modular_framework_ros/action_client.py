@@ -13,8 +13,8 @@ from actionlib.action_client import ClientGoalHandle
 class SteadyActionClient(actionlib.SimpleActionClient):
     """An actionlib.SimpleActionClient for servers that answer at once.
 
-    actionlib's client discards every message of the server that arrives before `send_goal` has returned, so that a goal
-    which is accepted or ends that early stays pending for ever. This client delays such messages until then. It also
+    actionlib's client discards every message of the server that arrives before `send_goal` has returned, so that a
+    goal that is accepted or ends that early stays pending forever. This client delays such messages until then. It also
     delays the next goal until the end of the previous goal is stored: `done_cb` is called before that, and a goal sent
     in between would be marked as done. `done_cb` must therefore not wait for another thread that sends a goal.
     """

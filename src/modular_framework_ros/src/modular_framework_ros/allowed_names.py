@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Texts of messages that refuse a name: the allowed names and the one that was probably meant."""
+"""Text for error messages about unknown names: the allowed names and the most similar name."""
 
 from __future__ import annotations
 

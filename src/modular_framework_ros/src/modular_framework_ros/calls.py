@@ -63,7 +63,7 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
     """Waits for a service to be advertised.
 
     Raises:
-        CallError: The service was not advertised in time, or the task was asked to stop.
+        CallError: The service was not advertised in time, or the task was stopped.
     """
     end = time.monotonic() + timeout_s
     report = WaitReport(f"service '{proxy.resolved_name}'", timeout_s)
@@ -102,7 +102,7 @@ def call_service(
 
     Raises:
         CallError: The service is absent, rejected the call or did not respond in time, the request has a value of the
-            wrong type, or the task was asked to stop.
+            wrong type, or the task was stopped.
     """
     answers: list[Any] = []
     errors: list[Exception] = []
@@ -111,7 +111,7 @@ def call_service(
     def call() -> None:
         try:
             answers.append(proxy(request))
-        except Exception as error:  # whatever it is, the caller reports it
+        except Exception as error:  # the caller reports any error
             errors.append(error)
         finally:
             done.set()
@@ -164,7 +164,7 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
         timeout_s: Maximum wait [s of real time].
 
     Raises:
-        CallError: No server was connected in time, or the task was asked to stop.
+        CallError: No server was connected in time, or the task was stopped.
     """
     what = f"action server '{rospy.resolve_name(name)}'"
     there = wait_for_start(lambda: is_connected(client) or stop_requested(), what, timeout_s)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the parameter declarations of a node from `parameters/NODE.yaml` in its package.
 
-The node reads its own file; programs that check a launch before it starts read it without importing the node.
+The node reads its own file; launch checks read the file without importing the node.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "dict": ((dict,), "a mapping"),
     "any": ((object,), "any value"),
 }
-"""Python types of each type word, and their description in messages."""
+"""Python types of each declared type, and their description in messages."""
 
 
 class DeclarationError(Exception):
@@ -53,9 +53,9 @@ class Declaration:
         items: Type of each item of a list or mapping, a key of TYPES; empty for any type.
         names: Kind of object that the value names, such as `planner` or `group`; empty for other values.
         adjustable: Minimum and maximum for dynamic_reconfigure at run time; empty if fixed.
-        tree: Whether the parameter has sub-parameters that only the robot or a plugin knows.
-        below: PACKAGE/NAME of the declaration of these sub-parameters, in which `{joint}`, `{link}` and `{group}` stand
-            for names of the robot; empty if any are allowed.
+        tree: Whether the parameter is a namespace whose keys depend on the robot or a plugin.
+        below: PACKAGE/NAME of the declarations in this namespace, with the placeholders `{joint}`, `{link}` and
+            `{group}` for names of the robot; empty to allow all keys.
     """
 
     name: str
@@ -95,7 +95,7 @@ class Declaration:
 
     @property
     def needed(self) -> str:
-        """Description of the allowed values and of the meaning, for messages."""
+        """Allowed values and meaning, as text for messages."""
         return f"allowed: {self.allowed} ({self.doc.rstrip('.')})"
 
     def resolved(self, get: Callable[[str], Any]) -> Declaration:
@@ -107,7 +107,7 @@ class Declaration:
         return replace(self, required=True) if self.required_with and get(self.required_with) else self
 
     def fault(self, value: Any) -> str:
-        """Returns the error of a value as text that follows the parameter name; "" for a valid value."""
+        """Returns the error message of a value, without the parameter name; "" for a valid value."""
         fits = _is_of(self.type, value)
         if fits and self.items:
             items = value.values() if isinstance(value, dict) else value
@@ -125,7 +125,7 @@ class Declaration:
 
 
 def _is_of(word: str, value: Any) -> bool:
-    """Returns whether a value has the type of a type word; a boolean is not a number."""
+    """Returns whether a value has a declared type; booleans are not numbers."""
     kinds = TYPES[word][0]
     return isinstance(value, kinds) and (object in kinds or isinstance(value, bool) == (bool in kinds))
 
@@ -136,7 +136,7 @@ class NodeDeclaration:
 
     Attributes:
         parameters: Declarations by the name in the file.
-        closed: Whether the node has no other private parameters, so that an undeclared private name is misspelt. False
+        closed: Whether an undeclared private parameter is an error. False
             for nodes that read the parameters of other configuration packages.
     """
 
@@ -167,7 +167,7 @@ class ParameterReader:
         return self._declared[name]
 
     def value(self, name: str) -> Any:
-        """Returns the value of a parameter, or its default; a number of type float as a float.
+        """Returns the value of a parameter, or its default; integers become floats if the declared type is float.
 
         Args:
             name: Declared name, with `~` for a private parameter.
@@ -267,7 +267,8 @@ def _packages() -> rospkg.RosPack:
 def read_declaration(path: Path) -> NodeDeclaration:
     """Reads a file of parameter declarations.
 
-    Its keys: `parameters` ({name: {type, doc, default, ...}}), `includes` (a list of PACKAGE/NODE whose parameters
+    Keys of the file: `parameters` ({name: {type, doc, default, ...}}), `includes` (a list of PACKAGE/NODE whose
+    parameters
     are included), `closed` (true or false).
 
     Raises:

@@ -91,8 +91,8 @@ class Reconfiguration:
             namespace: Absolute namespace, or one that begins with "~".
             table: Adjustable parameters.
             holder: Object that has the settings.
-            attribute: Name of the holder's attribute with the settings, a frozen dataclass that is replaced as a whole,
-                so that readers never see a mixture of old and new settings.
+            attribute: Name of the holder's attribute with the settings. The settings are a frozen dataclass that is
+                replaced as a whole, so that readers never see a mixture of old and new settings.
         """
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute

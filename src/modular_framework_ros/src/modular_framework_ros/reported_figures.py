@@ -53,7 +53,7 @@ BEST_RANK = Figure("best_rank", "generation", "", "Rank of the first reachable g
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
 PROCESSOR_TIME = Figure("processor_s", "planning", "s", "Processor time of the plan.", Clock.PROCESSOR, Source.MEASURED)
 CONCURRENT = Figure(
-    "concurrent", "planning", "", "Plans made at the same time, this one included.", source=Source.MEASURED
+    "concurrent", "planning", "", "Number of concurrent plans, including this plan.", source=Source.MEASURED
 )
 SEARCH_TIME = Figure(
     "search_time_s", "planning", "s", "Time until the planner found a path.", Clock.WALL, Source.MEASURED

@@ -28,7 +28,7 @@ def publish_directly() -> None:
 
 
 class DirectConnection(QueuedConnection):  # type: ignore[misc]
-    """A subscriber connection that sends at once as much as the socket accepts, without blocking.
+    """A subscriber connection that immediately sends as much as the socket accepts, without blocking.
 
     The rest waits for rospy's thread of the connection, which discards the oldest messages as in rospy.
 
@@ -38,7 +38,7 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]
     """
 
     def __init__(self, connection: Any, queue_size: int) -> None:
-        self._begun = b""  # rest of a partly sent message
+        self._begun = b""  # unsent part of a message
         self._thread_sends = False
         super().__init__(connection, queue_size)
 

@@ -3,10 +3,10 @@
 
 actionlib's SimpleActionClient ignores messages about a goal until send_goal() has returned, and logs an error. The
 server receives the goal earlier: rospy passes the message to a thread of the connection, yields the processor, and
-counts the bytes of the message only when the sending thread runs again. From then on that thread needs neither the
-network nor a lock, and Python lets a running thread keep the interpreter for 5 ms. The server therefore waits until the
-client's node has counted the message. No stronger guarantee is possible: every response of a client comes from a
-different thread than that of send_goal(), which the operating system may interrupt at any point.
+counts the bytes of the message only when the sending thread runs again. From then on, this thread needs neither the
+network nor a lock, and Python does not interrupt a running thread for 5 ms. The server therefore waits until the
+client's node has counted the message. No stronger guarantee is possible: a client sends its responses from a different
+thread, which the operating system may interrupt at any point.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class GoalSenders:
             sender = self._senders[client] = _Sender(connection)
         if connection is None:  # already closed
             return 0
-        if goal.header.seq == 1:  # first message of the client; the transport also counts its own header
+        if goal.header.seq == 1:  # the client's first message; num_messages also counts the transport's header
             sender.difference = -len(encode_ros_handshake_header(connection.protocol.get_header_fields()))
         return int(connection.stat_bytes)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Replaces a program of other stacks that this one does not have: logs the reason and an alternative."""
+"""Stands in for programs of other stacks that do not exist here: logs the reason and an alternative."""
 
 from __future__ import annotations
 

@@ -44,6 +44,6 @@ class RunningGoals:
 
     def remove(self, handle: Any) -> None:
         """Removes a goal that has ended."""
-        name = handle.get_goal_id().id  # takes the server's lock, which is held when add() and cancel() are called
+        name = handle.get_goal_id().id  # takes the lock that the callers of add() and cancel() hold
         with self._lock:
             self._goals.pop(name, None)

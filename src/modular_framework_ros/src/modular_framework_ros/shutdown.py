@@ -15,7 +15,7 @@ def hold_shutdown(ended: threading.Event, longest_s: float = MAX_SHUTDOWN_DELAY_
     """Makes a shutdown of this node set `ended` and then wait; topics and services remain available during the wait.
 
     Args:
-        ended: Event that asks the main thread to end.
+        ended: Event that ends the main thread.
         longest_s: Maximum delay of the shutdown [s].
 
     Returns:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Holds simulated time while a node computes, and advances it while the node waits.
 
-With the parameter ``/wait_for_planning`` a simulation lets nodes hold its time. Held time advances only while a
+With the parameter ``/wait_for_planning``, nodes can hold the time of the simulation. Held time advances only while a
 controller executes a goal, or on request by ``SimulatedTime.sleep``. Without the parameter, and on a real robot, time
 is never held, and waits use the ROS clock.
 """
@@ -43,7 +43,7 @@ class SimulatedTime:
 
     @property
     def enabled(self) -> bool:
-        """Whether the simulation lets nodes hold its time."""
+        """Whether nodes can hold the time of the simulation."""
         if self._enabled is None:
             self._enabled = bool(DeclaredParameters("modular_framework_ros", "launch").value(WAIT_PARAMETER))
         return self._enabled
@@ -157,7 +157,7 @@ class SimulatedTime:
 def _clock_shows(time_s: float) -> bool:
     """Returns whether the clock of this node has reached a time of the simulation [s]."""
     late_s = rospy.get_time() - time_s
-    return -SAME_TIME_S < late_s < CLOCK_JUMP_S  # a larger value precedes a reset of the world
+    return -SAME_TIME_S < late_s < CLOCK_JUMP_S  # a larger value was read before a reset of the world
 
 
 def _hold(request: HoldTimeRequest) -> None:

@@ -26,6 +26,6 @@ def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
 
 
 def stop_requested() -> bool:
-    """Returns whether this thread has been asked to stop; always False outside `stoppable`."""
+    """Returns whether a stop of this thread was requested; always False outside `stoppable`."""
     requested: Callable[[], bool] | None = getattr(_THREAD, "requested", None)
     return requested is not None and requested()

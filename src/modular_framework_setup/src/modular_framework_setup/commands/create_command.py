@@ -2,7 +2,7 @@
 """Creates the packages of a robot from its URDF: ROBOT_robot and ROBOT_moveit_config.
 
 The first contains the description and controllers, the second the planning configuration. On a terminal, the command
-asks the user to confirm the parts it found; otherwise the options decide.
+asks for confirmation of the detected parts; otherwise the options decide.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Replaces the collision matrix in an SRDF text; the rest of the text is unchanged."""
+"""Replaces the collision matrix in an SRDF text and keeps all other text."""
 
 from __future__ import annotations
 

@@ -32,12 +32,12 @@ from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
 
 SEGMENT_RAD = 0.05  # distance between collision-checked states of a path
-ACCELERATION_PER_VELOCITY = 2.0  # [1/s], full speed in half a second
+ACCELERATION_PER_VELOCITY = 2.0  # acceleration per velocity [1/s]; reaches full speed in half a second
 
 Ends = Mapping[str, tuple[float, float]]
 """Open and closed position of each gripper's driven joint, by gripper name [rad or m]."""
 ConfirmParts = Callable[[RobotTree, RobotParts], RobotParts]
-"""Function that lets the user confirm or correct the parts that were found."""
+"""Function with which the user confirms or corrects the detected parts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

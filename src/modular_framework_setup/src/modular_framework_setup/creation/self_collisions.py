@@ -67,7 +67,7 @@ def find_verdicts(
         progress: Function called with the completed fraction.
 
     Returns:
-        One verdict per pair of links with shapes, in alphabetical order.
+        One result per pair of links with shapes, in alphabetical order.
     """
     sampling = CollisionSampling(model)
     random = np.random.default_rng(seed)

@@ -85,7 +85,7 @@ class GroupRow:
 
     Attributes:
         name: Name of the group.
-        ends: Chains and subgroups, in words.
+        ends: Chains and subgroups, as text.
         active: Joints that a planner moves.
         others: Other joints, sorted.
         solver: Kinematics solver in kinematics.yaml; "" if none is given.
