@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-NARROW_FRACTION = 0.5  # minimum fraction of checks in collision that counts as a narrow passage
+NARROW_FRACTION = 0.5  # minimum fraction of checks in collision that indicates a narrow passage
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class CheckCounts:
     """Numbers of collision checks of states, edges and curves, by the layer that decided them.
 
     Attributes:
-        asked: Requested checks, without cached results.
+        asked: Number of requested checks, excluding cached results.
         free_by_bounds: Checks that the compiled check of spheres and surfaces found free.
         touching_by_bounds: Checks that the compiled check found in collision.
         undecided: Checks left to the exact check (Coal).

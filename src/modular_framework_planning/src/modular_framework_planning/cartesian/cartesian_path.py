@@ -22,7 +22,7 @@ from modular_framework_planning.planning_interface.motion_check import MotionChe
 MAX_STEP_M = 0.01  # upper bound for max_step of a request
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may rotate by 0.035 rad, as in MoveIt
 MAX_STEPS = 50_000  # per request
-MIN_STEPS_FOR_MEAN = 10  # per line, if jumps are detected by the mean step
+MIN_STEPS_FOR_MEAN = 10  # steps per line if jumps are detected by the mean step
 
 Objection = Callable[[Array, Array], str]
 
@@ -243,7 +243,7 @@ class _Line:
         return ""
 
     def _without_far_step(self, rows: list[Array]) -> tuple[list[Array], str]:
-        """Removes all rows after the first step that exceeds the jump factor; returns the rest and the reason."""
+        """Truncates the path before the first step that exceeds the jump factor; returns the path and the reason."""
         if self._jumps.factor <= 0.0 or len(rows) < 3:
             return rows, ""
         changes = np.diff(np.array(rows), axis=0)

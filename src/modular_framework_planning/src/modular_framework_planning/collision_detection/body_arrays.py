@@ -28,7 +28,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import MAX_CACHED_MODELS, LinkGeometry, RobotModel
 
 GROUPING_CACHE_SIZE, SCENE_CACHE_SIZE = 16, 2
-SMALL_EXCESS = 2.0e-3  # [m]; a surface with at most this excess is as good as exact
+SMALL_EXCESS = 2.0e-3  # maximum excess of a surface that counts as exact [m]
 Grouping = tuple[tuple[int, ...], ...]
 
 

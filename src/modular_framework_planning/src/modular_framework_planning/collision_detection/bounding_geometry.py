@@ -39,8 +39,8 @@ from modular_framework_planning.geometry.shapes import Box, Capsule, Cone, Cylin
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree
 
-MAX_EDGE_M, MAX_EDGE_FRACTION = 0.02, 0.05  # triangles with longer edges are cut; fraction of the surface's extent
-PRISM_SIDES = 64  # the prism around a cylinder of 1 m radius is 1.2 mm too wide
+MAX_EDGE_M, MAX_EDGE_FRACTION = 0.02, 0.05  # longer triangle edges are split; fraction of the surface's extent
+PRISM_SIDES = 64  # the prism exceeds a cylinder of 1 m radius by at most 1.2 mm
 _lock = threading.Lock()
 
 
@@ -181,7 +181,7 @@ def _surface(triangles: Array) -> Surfaces:
 
 
 def _is_closed(vertices: Array, faces: Any) -> bool:
-    """Whether the surface has an inside: every edge then occurs equally often in both directions."""
+    """Whether the surface is closed: every edge must occur equally often in both directions."""
     order = np.lexsort(np.round(vertices, 7).T)
     ranked = np.round(vertices[order], 7)
     ranks = np.concatenate([[0], np.cumsum((np.diff(ranked, axis=0) != 0.0).any(axis=1))])

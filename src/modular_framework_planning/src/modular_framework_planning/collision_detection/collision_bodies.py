@@ -18,8 +18,8 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 Joints = Sequence[int] | NDArray[np.int64] | None
-PAIR_CACHE_SIZE = 16  # robots or scenes whose pairs are cached
-UNNAMED = Body("", WORLD)  # represents all bodies of the world that the allowed collision matrix does not name
+PAIR_CACHE_SIZE = 16  # number of cached robots and scenes
+UNNAMED = Body("", WORLD)  # stands for all world bodies without an entry in the allowed collision matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +150,7 @@ def _watched_pairs(
     Args:
         model: Robot model.
         moving: Indices of the joints that will move; None for all joints.
-        verdicts: Entries and default entries of the allowed collision matrix.
+        verdicts: Entries and defaults of the allowed collision matrix.
         others: Bodies of the geometries that are not links, bodies of the world last.
         joint_ids: PlacedGeometry.joint_id of all geometries.
         margins: PlacedGeometry.margin of all geometries.
@@ -166,7 +166,7 @@ def _watched_pairs(
     acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
     allowed = _allowed(acm, bodies[:robot_count], others)
     indices, held = np.arange(len(bodies)), kinds == ATTACHED
-    first, second = indices[:robot_count, None], indices[None, links:]  # the world has no moving pairs of its own
+    first, second = indices[:robot_count, None], indices[None, links:]  # world bodies do not move mutually
     is_rigid = (rigid_ids[joints[first]] == rigid_ids[joints[second]]) & ~held[first] & ~held[second]
     checked = np.nonzero((second > first) & ~is_rigid & ~allowed)
     first, second = checked[0], checked[1] + links

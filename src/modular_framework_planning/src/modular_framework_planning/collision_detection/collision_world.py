@@ -30,7 +30,7 @@ from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 FIELD_CELLS = 64  # cells along each axis of the distance field
-MAX_FIELD_REACH_M = 2.5  # from the origin of the planning frame to the sides of the field
+MAX_FIELD_REACH_M = 2.5  # distance from the origin of the planning frame to the sides of the field
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,7 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 ROUNDING = 1.0e-9  # [m]
-MAX_CONTACTS = 20  # computed per pair; the deepest contact is reported
+MAX_CONTACTS = 20  # contacts computed per pair; the deepest contact is reported
 
 
 class ExactCollision:
@@ -54,7 +54,7 @@ class ExactCollision:
         return self._parts[part_index].source.geometry, self._pose(part_index)
 
     def _is_far(self, pair_index: int) -> bool:
-        """Returns whether the bounding spheres are apart; Coal then need not build a tree over a mesh."""
+        """Returns whether the bounding spheres are disjoint; Coal then builds no tree over a mesh."""
         return self._sphere_distance(pair_index) > self._pairs[pair_index].margin + ROUNDING
 
     def _sphere_distance(self, pair_index: int) -> float:
@@ -141,8 +141,8 @@ class ExactCollision:
     def distance(self, positions: Array, pair_indices: Iterable[int]) -> float:
         """Returns the minimum distance over the pairs [m], at most 0 if a pair touches.
 
-        The pairs are visited in the order of their bounding spheres' distances. The search ends at the first pair whose
-        spheres are farther apart than the minimum so far, because a distance of detailed meshes takes milliseconds.
+        Pairs are visited in order of their sphere distances, and the search ends when this distance exceeds the
+        minimum so far. One distance between detailed meshes takes milliseconds.
         """
         self._update_poses(positions)
         min_distance = float(np.inf)

@@ -158,7 +158,7 @@ class ExactCollisionChecker:
             if written == count:
                 break
             decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
-            self.check_counts[REQUESTED] -= 1  # the repeated check counts once
+            self.check_counts[REQUESTED] -= 1  # the check was already counted
             status, count, at_vertices = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
             return count, at_vertices

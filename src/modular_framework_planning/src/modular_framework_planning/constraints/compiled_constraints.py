@@ -23,16 +23,16 @@ from modular_framework_planning.kinematics.compiled_kinematics import (
 )
 
 TOLERANCE = 1.0e-6  # accuracy of inverse kinematics, so that a zero-size region stays reachable [m or rad]
-TIGHT_TOLERANCE = 0.005  # projections aim at the centre of smaller tolerances, even if satisfied [m or rad]
-INNER_FRACTION = 0.9  # fraction of a tolerance that projections aim at, because edges between two states bulge
-HULL_MARGIN = 1.0e-5  # projections aim this far inside a hull [m]
+TIGHT_TOLERANCE = 0.005  # projections target the centre of tolerances below this value [m or rad]
+INNER_FRACTION = 0.9  # projections target this fraction of a tolerance, because edges deviate between projected states
+HULL_MARGIN = 1.0e-5  # projections target a point at this depth inside a hull [m]
 MAX_STEP = 0.3  # maximum joint displacement in a projection step [rad or m]
 DAMPING = 1.0e-6
 IDENTITY = np.eye(3)
 SAME_STATE_DISTANCE = 1.0e-9  # [rad or m]
-MAX_PROJECTION_STEPS = 8  # limit in a walk, where projections start close to the constraints
+MAX_PROJECTION_STEPS = 8  # iteration limit in a walk, where projections start close to the constraints
 MIN_PROGRESS = 0.1  # minimum progress of a walk step towards the target, as a fraction of its length
-EULER_ANGLES, ROTATION_VECTOR, POINT = range(3)  # compared quantities
+EULER_ANGLES, ROTATION_VECTOR, POINT = range(3)  # quantity types
 BOX, SPHERE, CYLINDER, CONE, HULL = range(5)  # region shapes
 
 

@@ -33,7 +33,7 @@ def joint_tree(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
     zeros = np.zeros(pin_model.nq)
     axes, prismatic = [], []
     for joint_id in joint_ids:  # a joint's column of its own Jacobian is its axis, linear above angular
-        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(6, -1)  # flat for a single joint
+        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(6, -1)  # flat for one joint
         column = jacobian[:, pin_model.joints[joint_id].idx_v]
         prismatic.append(bool(np.linalg.norm(column[:3]) > 0.5))
         axes.append(column[:3] if prismatic[-1] else column[3:])
@@ -49,7 +49,7 @@ def joint_tree(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
     )
 
 
-BALL_GAIN = 10.0  # radians per unit of a ball joint value, so that the ball joint costs little in distances
+BALL_GAIN = 10.0  # radians per unit of a ball joint value; the ball joint then contributes little to distances
 
 
 def with_ball_joint(chain: Chain, joint: Array, width: int) -> Chain:

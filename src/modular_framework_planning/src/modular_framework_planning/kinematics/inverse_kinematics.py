@@ -42,7 +42,7 @@ MAX_ROTATED_SOLUTIONS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
 STARTS_PER_BATCH = 4
 MIN_BATCHES = 8  # tried even after the timeout, so that a busy machine does not report reachable poses as unreachable
-MAX_FRUITLESS_BATCHES = 32  # consecutive batches without a new solution that end the numeric search
+MAX_FRUITLESS_BATCHES = 32  # the numeric search ends after this number of consecutive batches without a new solution
 MAX_SOLUTIONS, MAX_REDUNDANT_SOLUTIONS = 16, 8  # limits of the numeric search
 MAX_APPROACHED = 4  # solutions of a redundant chain that are moved closer to the seed
 
@@ -210,7 +210,7 @@ class InverseKinematics:
         return np.maximum(lower, values - reach), np.minimum(upper, values + reach)
 
     def _from_closed_form(self, problem: _Problem) -> Array:
-        """Returns the closed-form solutions within bounds, including full rotations, shape (k, joints)."""
+        """Returns the closed-form solutions within bounds, and their copies shifted by 2 pi, shape (k, joints)."""
         if self._closed_form is None:
             return np.empty((0, len(self.group.joints)))
         base = (
@@ -250,7 +250,7 @@ class InverseKinematics:
         return np.append(grid, np.clip(seed_value, low, high))
 
     def _polished(self, problem: _Problem, candidates: Array) -> Array:
-        """Returns the refined candidates that are at the target and within bounds, including full rotations."""
+        """Returns the refined candidates that reach the target within bounds, and their copies shifted by 2 pi."""
         excess = candidates - (problem.upper + BOUNDS_MARGIN)
         wrapped = candidates - np.where(self._is_revolute, 2.0 * np.pi * np.ceil(excess / (2.0 * np.pi)), 0.0)
         candidates = candidates[(wrapped >= problem.lower - BOUNDS_MARGIN).all(axis=1)]
@@ -272,7 +272,7 @@ class InverseKinematics:
         return full_rotations(rows, self._is_revolute, problem.lower, problem.upper, MAX_ROTATED_SOLUTIONS)
 
     def _from_search(self, problem: _Problem, rng: Generator) -> Array:
-        """Returns solutions of searches from the seed and from random positions, up to a number or a timeout."""
+        """Searches from the seed and from random positions until the timeout or enough solutions."""
         reach = np.where(problem.is_revolute, 2.0 * np.pi, np.inf)
         lower, upper = np.maximum(problem.lower, problem.seed - reach), np.minimum(problem.upper, problem.seed + reach)
         solutions = np.empty((0, len(lower)))
@@ -309,7 +309,7 @@ class InverseKinematics:
 
     @staticmethod
     def _approached(problem: _Problem, rows: Array) -> Array:
-        """Returns the solutions of a redundant chain with copies moved closer to the seed added."""
+        """Adds copies of the best solutions of a redundant chain, moved closer to the seed; sorts by seed distance."""
         approached = rows[:MAX_APPROACHED].copy()
         for values in approached:
             approach_seed(
@@ -369,7 +369,7 @@ class _Problem:
         object.__setattr__(self, "pose", np.ascontiguousarray(self.target.homogeneous[:3]))
 
     def with_ball_joint(self, joint: Transform) -> _Problem:
-        """Returns the problem with a ball joint, at a pose in the last link's frame, that frees the orientation."""
+        """Returns the problem with an added ball joint, which makes the orientation of the link free."""
         reach = np.full(3, np.pi / BALL_GAIN)
         return replace(
             self,

@@ -20,10 +20,10 @@ from modular_framework_planning.kinematics.inverse_kinematics import InverseKine
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
 POSE_TOLERANCE = 1.0e-9  # tolerance of the pose error norm [m and rad]
-ACCEPTED_ERROR = 1.0e-7  # accepted error if rounding keeps Newton's method from POSE_TOLERANCE
+ACCEPTED_ERROR = 1.0e-7  # accepted error if rounding prevents convergence to POSE_TOLERANCE
 NEWTON_STEPS = 25
 MAX_JUMP = 0.3  # maximum difference between a guess and its solution [rad or m]
-MAX_TRAVEL = 1.5  # maximum joint displacement before Newton's method counts as diverged [rad or m]
+MAX_TRAVEL = 1.5  # larger joint displacements count as divergence of Newton's method [rad or m]
 BOUND_TOLERANCE = 1.0e-6
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import SAME_SOLUTION
 
-SIMILAR_DISTANCE = 0.1  # difference of seed distances below which the clearance decides [rad]
+SIMILAR_DISTANCE = 0.1  # solutions within this difference of seed distances are compared by clearance [rad]
 
 
 def first_free(candidates: list[Array], is_free: Callable[[Array], bool], max_count: int = 1) -> list[Array]:
@@ -37,7 +37,7 @@ def first_free(candidates: list[Array], is_free: Callable[[Array], bool], max_co
 
 
 def clearest(free: list[Array], seed: Array, clearance: Callable[[Array], float]) -> Array:
-    """Returns the solution nearest to the seed or, among similarly near solutions, the one with the largest clearance.
+    """Returns the solution nearest to the seed; similarly near solutions are compared by clearance.
 
     Args:
         free: Free solutions, nearest to the seed first.

@@ -18,7 +18,7 @@ from modular_framework_planning.trajectory_execution.controllers import Controll
 
 @dataclass(frozen=True, slots=True)
 class MotionPart:
-    """The part of a motion that one controller executes."""
+    """Part of a motion for a single controller."""
 
     controller: ControllerSpec
     trajectory: JointTrajectory

@@ -14,7 +14,7 @@ from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-CLEARED = "cleared"  # type of a map without data, which means a cleared octomap
+CLEARED = "cleared"  # type of a map without data, which clears the octomap
 
 
 def with_octomap_of(scene: PlanningScene, message: OctomapWithPose) -> PlanningScene:

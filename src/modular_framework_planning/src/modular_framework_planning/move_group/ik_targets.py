@@ -28,10 +28,10 @@ from modular_framework_planning.messages.poses import stamped_in_scene
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-MIN_ATTEMPTS = 32  # made even after the timeout, so that a busy machine does not report reachable poses as unreachable
-MAX_ATTEMPTS = 1024  # used without a time limit
+MIN_ATTEMPTS = 32  # attempts made even after the timeout, for results independent of the machine's load
+MAX_ATTEMPTS = 1024  # attempts without a time limit
 MAX_COMBINATIONS = 256  # combined solutions of several subgroups
-POSE_TOLERANCE = 1.0e-4  # [m and rad]; exceeded if one subgroup moves the base of another
+POSE_TOLERANCE = 1.0e-4  # pose tolerance [m and rad]; not met if a subgroup moves the base of another subgroup
 
 
 @dataclass(frozen=True, slots=True, eq=False)

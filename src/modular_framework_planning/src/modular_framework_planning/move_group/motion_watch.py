@@ -20,7 +20,7 @@ from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.trajectory_execution.path_watch import PathCollision, PathWatch
 
-PERIOD_S = 0.05  # of checks of the scene
+PERIOD_S = 0.05  # period of the scene checks
 TIME_SHIFTS_S = (-0.1, 0.0, 0.1)  # delays of a running motion that are checked before another motion starts
 JOIN_TIMEOUT_S = 5.0
 

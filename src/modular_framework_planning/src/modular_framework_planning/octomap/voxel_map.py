@@ -99,7 +99,7 @@ class VoxelMap:
         return VoxelMap(self.resolution, *merge(self.keys, self.values, keys[is_last], steps[is_last], LOWEST, HIGHEST))
 
     def with_point_cloud(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
-        """Returns the map updated by rays that end at points and clear all voxels on their way.
+        """Returns the map updated by rays, which mark the voxels of their end points and clear all voxels before.
 
         Args:
             origin: Position of the sensor, shape (3,) [m].

@@ -23,7 +23,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 ROUND_SIDES = 24
 DEPTH_NOISE = 0.125 / (525.0 * 0.075)  # [1/m]; disparity step of 1/8 pixel over focal length [pixel] and baseline [m]
 
-MAX_PLANES = 64  # per region; larger hulls get tangent planes in fixed directions, at most 3 % larger for a sphere
+MAX_PLANES = 64  # larger hulls are replaced by tangent planes in fixed directions (at most 3 % larger for a sphere)
 
 
 def _even_directions(count: int) -> Array:

@@ -206,7 +206,7 @@ class GoalResolver:
         except PlanningError:
             if allowed is None:
                 raise
-            return self._region(allowed)  # least squares without a chain to the link
+            return self._region(allowed)  # least squares, because no chain leads to the link
         candidates = [positions[self._group.indices] for positions in solutions]
         free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if allowed is not None and allowed.is_loose:

@@ -20,7 +20,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.trajectory_processing.compiled_polylines import pieces_on_edges
 
-MIN_LOOKUP_STEPS = 8  # checking a shorter piece again is faster than looking it up among the known edges
+MIN_LOOKUP_STEPS = 8  # shorter pieces are checked again, which is faster than a look-up among the known edges
 EDGE_TOLERANCE = 1.0e-8  # maximum distance between an edge and a point on this edge [rad or m]
 
 

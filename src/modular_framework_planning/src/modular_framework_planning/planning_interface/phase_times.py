@@ -38,9 +38,9 @@ class PhaseTimes:
         self.seconds: dict[str, float] = {}
         self._checks: dict[str, NDArray[np.int64]] = {}
         self._checker: CountsChecks | None = None
-        self._counts = np.zeros(CHECK_COUNTS, np.int64)  # updated in place by the checker
+        self._counts = np.zeros(CHECK_COUNTS, np.int64)  # the checker updates this object in place
         self.run: PlannerRun | None = None
-        self._nested_s = [0.0]  # time of the nested phases of each open phase
+        self._nested_s = [0.0]  # total time of the nested phases, per open phase
         self._nested_checks = [np.zeros(CHECK_COUNTS, np.int64)]
 
     def record_implementation(self, implementation: str) -> None:

@@ -69,7 +69,8 @@ class PlanningProblem:
         max_velocity, max_acceleration: Limits of the group's joints with scaling applied, shape (joints,).
         rng: Random generator of the planner, so that a seed repeats a plan.
         begun_s, end_s: Monotonic time at the start of the request and at the end of its allowed time [s].
-        deadline_s: Monotonic time at which the planner must stop; the rest is reserved for the validation [s].
+        deadline_s: Monotonic time at which the planner must stop [s]; the remaining time is reserved for the
+            validation.
         solution_validator: Validator of every timed motion.
         planner_id: Planner name, without "group[...]".
         planner_parameters: Settings of the planner from planner_configs.

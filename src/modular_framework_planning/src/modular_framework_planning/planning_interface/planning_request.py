@@ -20,8 +20,8 @@ from modular_framework_urdf.mimics import Mimic
 if TYPE_CHECKING:
     from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 
-CHECKS_PER_MOTION_STEP = 100  # cheap away from contact, where a known clearance covers many states
-DEFAULT_PLANNER = "default_planner_config"  # parameter of a group or a pipeline
+CHECKS_PER_MOTION_STEP = 100  # far from obstacles, one clearance certifies many states
+DEFAULT_PLANNER = "default_planner_config"  # name of the parameter in a group or a pipeline
 MIMIC_TOLERANCE = 1.0e-4  # accepted difference between a mimic joint and its leader [rad or m]
 
 
@@ -68,7 +68,7 @@ class JointGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """Target pose of a link in the planning frame; `allowed` describes all poses that reach the goal."""
+    """Target pose of a link in the planning frame; `allowed` is the region of accepted poses."""
 
     link: str
     target: Transform
@@ -98,12 +98,12 @@ class PipelineSettings:
     """Settings of a pipeline, named after the parameters in a MoveIt config package.
 
     Attributes:
-        start_state_max_bounds_error: Maximum bounds violation of a start that is corrected [rad or m].
-        start_state_max_dt: Maximum duration of the motion from a start out of bounds to the bounds [s].
+        start_state_max_bounds_error: Maximum bounds violation at the start that is corrected [rad or m].
+        start_state_max_dt: Maximum duration of the motion from an out-of-bounds start to the bounds [s].
         jiggle_fraction: Search range for a free start around a colliding start, as a fraction of the joint ranges.
         max_sampling_attempts: Maximum number of states tried around a colliding start.
-        start_state_collision_depth: Maximum contact depth of a start that is corrected [m].
-        start_state_contact_tolerance: Maximum contact depth of an attached object that is tolerated at the start [m].
+        start_state_collision_depth: Maximum penetration depth at the start that is corrected [m].
+        start_state_contact_tolerance: Tolerated penetration depth of an attached object at the start [m].
         search_step: Maximum joint displacement between collision checks of a search [rad or m].
         motion_step: Maximum joint displacement between constraint checks of a motion [rad or m]; collision checks of
             the returned motion use `finest_step`.
@@ -198,7 +198,7 @@ class PlanningRequest:
         group: Name of the planning group.
         goals: Alternative goals.
         pipeline_id, planner_id: Names of pipeline and planner; empty for the defaults.
-        attempts: Number of searches, of which the shortest path is returned.
+        attempts: Number of searches; the shortest path is returned.
         allowed_time_s: Allowed planning time [s].
         velocity_scaling, acceleration_scaling: Fractions of the joint limits; 0 for the defaults.
         cancelled: Returns True to cancel the request.
@@ -207,7 +207,7 @@ class PlanningRequest:
         max_cartesian_speed: Speed limit of `cartesian_speed_limited_link` [m/s]; 0 for no limit.
         workspace: Bounds of a moving base.
         seed: Random seed; None for the seed of the pipeline.
-        max_iterations: Iteration limit of a search; None for no limit but time.
+        max_iterations: Iteration limit of a search; None to limit only the time.
         auxiliary_point: Auxiliary point of a circular motion.
     """
 

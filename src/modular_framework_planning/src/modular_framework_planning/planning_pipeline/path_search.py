@@ -19,7 +19,7 @@ from modular_framework_planning.trajectory_processing.constrained_shortening imp
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
-SHORTENING_FRACTION = 0.3  # fraction of the remaining time, if the planner has used all of its time
+SHORTENING_FRACTION = 0.3  # fraction of the remaining time for shortening after an anytime planner
 BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
 
 
@@ -32,7 +32,7 @@ class PathSearch:
         self.repairs = hasattr(planner, "repaired")
 
     def __call__(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the path; a further call repairs the path of the first call again."""
+        """Returns the path; later calls repair the same path instead of planning again."""
         _require_start(problem)
         if self._path is None:
             with problem.phases.measured(SEARCH):

@@ -44,8 +44,8 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_ros.allowed_names import nearest
 
-RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # part of the allowed time reserved for repair, timing and validation
-RESERVED_IMPROVING_S = 1.0  # more for planners that improve their path, because they always use all of their time
+RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # time reserved for repair, timing and validation
+RESERVED_IMPROVING_S = 1.0  # larger reserve for anytime planners, which always use all of their time
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 LOGGER = logging.getLogger("rosout.planning_pipeline")
 

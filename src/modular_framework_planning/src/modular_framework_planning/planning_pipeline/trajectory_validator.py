@@ -19,7 +19,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.trajectory_processing.path_shortening import without_repeats
 
 SAMPLES_PER_TIME_CHECK = 200
-GRACE_S = 0.2  # time after the deadline in which a validation may finish
+GRACE_S = 0.2  # time that a running validation may exceed the deadline
 
 
 class TrajectoryValidator:

@@ -32,7 +32,7 @@ class AllowedCollisionMatrix:
 
     @cached_property
     def named(self) -> frozenset[str]:
-        """Names of bodies with an entry or a default; the verdict for all other bodies is `allows_others`."""
+        """Names of bodies with an entry or a default; `allows_others` applies to all other bodies."""
         return frozenset(chain(chain.from_iterable(self.entries), self.defaults))
 
     def allows(self, first: str, second: str) -> bool:
@@ -63,7 +63,7 @@ class AllowedCollisionMatrix:
         return replace(self, defaults={**self.defaults, **defaults}, names=names)
 
     def as_rows(self) -> list[list[bool]]:
-        """Returns the square matrix of verdicts over `names`, including defaults, as in the ROS message."""
+        """Returns the square matrix of allowed collisions over `names`, including defaults, as in the ROS message."""
         return [[self.allows(row, column) for column in self.names] for row in self.names]
 
 
@@ -97,12 +97,12 @@ def matrix_from_rows(
     """Builds a matrix from the upper triangle of its square form.
 
     Verdicts equal to the defaults become no entries, so that a matrix that is read and sent back keeps its meaning when
-    defaults change. Bodies with a default are named too.
+    defaults change. Bodies with a default are included.
 
     Args:
         names: Names of the bodies.
         rows: Whether each pair of bodies may touch, a square matrix.
-        defaults: Default verdict of each body.
+        defaults: Default of each body.
 
     Raises:
         ValueError: The matrix is not square, or a name occurs twice.

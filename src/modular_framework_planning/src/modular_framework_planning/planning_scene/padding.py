@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Margins between the robot and the world: MoveIt's link padding and link scale.
 
-Padding is a margin of a pair of bodies and leaves shapes unchanged: a link and a world object count as touching when
-closer than the margin. The result equals the exact Minkowski sum of the shape and a sphere, for meshes too.
+Padding does not change shapes; padding is the minimum distance between two bodies: a link and a world object count as
+touching when
+closer than the margin. The result equals the exact Minkowski sum of the shape and a sphere, also for meshes.
 As in MoveIt, pairs of links are never padded.
 """
 

@@ -313,7 +313,7 @@ SceneChange = Callable[[PlanningScene], PlanningScene]
 
 
 def _message_order(shape: Shape) -> int:
-    """Returns the rank of a shape in messages, which list primitives, then meshes, then planes."""
+    """Returns the sort key of a shape: messages list primitives first, then meshes, then planes."""
     return 2 if isinstance(shape, Plane) else 1 if isinstance(shape, Mesh) else 0
 
 

@@ -94,7 +94,7 @@ def _compile_collisions(robot: RobotModel) -> None:
     """Compiles the kernels that need a scene: octomaps, collision checks and searches."""
     build_sphere_tree(TETRAHEDRON)
     _check_motions(_scene(robot, _voxels()))
-    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: meshes import for 0.3 s
+    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes; meshes need a slow import
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
 
 

@@ -7,7 +7,7 @@ import ctypes
 import sys
 
 SWITCH_INTERVAL_S = 0.0005
-M_ARENA_MAX = -8  # name and value of a mallopt parameter in glibc
+M_ARENA_MAX = -8  # parameter number and value for glibc's mallopt
 ARENAS = 2
 
 

@@ -27,7 +27,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 WORKER = "modular_framework_planning.reproducible.seeded_worker"
 POLL_S = 0.02
 START_TIMEOUT_S = 300.0
-GRACE_S = 30.0  # time after the allowed planning time in which the child process must answer
+GRACE_S = 30.0  # time beyond the allowed planning time until the child process must respond
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 
 

@@ -91,7 +91,7 @@ def _child(connection: Connection, model: RobotModel, pipelines: dict[str, Plann
         def cancelled() -> bool:
             return bool(
                 select.select([connection], [], [], 0.0)[0]
-            )  # readable only if the parent closed the connection
+            )  # becomes readable when the parent closes the connection
 
         pipeline = pipelines[name]
         pipeline.settings = settings

@@ -15,7 +15,7 @@ def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[Joint
 
     Args:
         model: Robot model.
-        group: Planning group; empty for the parent group of the end effector. In a group that is not a chain, such as
+        group: Planning group; empty for the parent group of the end effector. In a group of several chains, such as
             two arms, the arm is the smallest chain that moves the end effector.
         name: Name of the end effector; empty for the only end effector of the group.
 

@@ -88,7 +88,7 @@ class RobotModel:
     def __init__(
         self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None, resolve: MeshResolver = package_resolver
     ) -> None:
-        self.source = (urdf, srdf, dict(limits or {}), resolve)  # to rebuild the model in a different process
+        self.source = (urdf, srdf, dict(limits or {}), resolve)  # used to rebuild the model in another process
         self.semantics: SemanticDescription = parse_srdf(srdf)
         self.document = load_urdf(urdf, resolve, self.semantics.virtual_joints)
         self.base = self.document.multi_dof_joint

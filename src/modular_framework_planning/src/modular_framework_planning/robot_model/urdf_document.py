@@ -26,7 +26,7 @@ from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
 PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
-CONTINUOUS_BOUND = 1.0e6  # bound that stands for the missing bounds of a continuous joint [rad]
+CONTINUOUS_BOUND = 1.0e6  # assumed bound of a continuous joint [rad]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +95,7 @@ def _check_kinds(robot: Robot) -> None:
 
 
 def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
-    """Returns the resolved mimic joints, and notes about ignored ones; raises ModelError for an invalid mimic."""
+    """Returns the resolved mimic joints, and notes about ignored joints; raises ModelError for an invalid mimic."""
     direct = {joint.name: joint.mimic for joint in robot.movable_joints() if joint.mimic is not None}
     try:
         mimics = resolved(direct, [joint.name for joint in robot.movable_joints()])

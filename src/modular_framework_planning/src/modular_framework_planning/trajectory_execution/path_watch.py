@@ -70,7 +70,7 @@ class PathWatch:
         self._reached = 0
 
     def _samples(self, times: Array, rows: Array) -> tuple[Array, Array]:
-        """Returns times and states of a polyline at most CHECK_STEP apart, including its points."""
+        """Samples a polyline, including its points, with steps of at most CHECK_STEP; returns times and states."""
         steps = self._model.displacement(rows[:-1], rows[1:], self._indices)
         unwrapped_rows = np.vstack([rows[:1], rows[0] + np.cumsum(steps, axis=0)])
         counts = np.maximum(1, np.ceil(np.abs(steps).max(axis=1, initial=0.0) / CHECK_STEP)).astype(int)
@@ -92,8 +92,8 @@ class PathWatch:
     def scene_collision(self, scene: PlanningScene) -> PathCollision | None:
         """Returns the first collision of the remaining path in a scene, or None.
 
-        States that already collided in the scene of the plan are ignored, because the planner accepted them, for
-        example a start in contact or an attached object on a table.
+        The watch ignores states that already collided in the scene of the plan and were accepted by the planner, such
+        as a start in contact or an attached object on a table.
         """
         checker, motion = self._checkers(scene)
         rest = self._rows[self._reached :]
@@ -159,7 +159,7 @@ class PathWatch:
         return None
 
     def _joint_motion_states(self, scene: PlanningScene, others: Sequence[PathWatch], lead_s: float) -> Array:
-        """Returns the predicted states of the whole robot until all motions have ended, at most CHECK_STEP apart."""
+        """Predicts the states of the whole robot until all motions have ended, with steps of at most CHECK_STEP."""
         watches = (self, *others)
         times_s = np.unique(np.concatenate([watch._times[watch._reached :] - watch._now_s for watch in watches]))
         result = np.tile(scene.positions, (len(times_s), 1))

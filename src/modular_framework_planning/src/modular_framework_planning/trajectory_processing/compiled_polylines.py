@@ -24,7 +24,7 @@ def needed_vertices(path: Array, tolerance: float) -> NDArray[np.int64]:
     count, joints = path.shape
     kept, kept_count = np.zeros(count, np.int64), 1
     before, after = np.empty(joints), np.empty(joints)
-    edge_end = 0  # end of the previous edge longer than the tolerance
+    edge_end = 0  # end of the last edge that is longer than the tolerance
     for index in range(1, count):
         length = 0.0
         for joint in range(joints):

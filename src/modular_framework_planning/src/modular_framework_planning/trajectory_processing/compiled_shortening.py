@@ -37,12 +37,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
-MIN_SHORTCUT_GAIN = 0.01  # gain of a shortcut, as a fraction of the path length
-MIN_PULL_GAIN = 0.003  # gain of a pulled vertex, as a fraction of the path length
+MIN_SHORTCUT_GAIN = 0.01  # minimum gain of a shortcut, as a fraction of the path length
+MIN_PULL_GAIN = 0.003  # minimum gain of a pulled vertex, as a fraction of the path length
 MAX_PULL_ROUNDS = 2
 MAX_FAILURES = 20  # consecutive failures that end the shortcutting stage
 VERTEX_TOLERANCE = 1e-9  # minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex
-EDGES_PER_CALL = 100  # edge checks after which the caller checks the clock
+EDGES_PER_CALL = 100  # the caller checks the time after this number of edge checks
 
 # Stages
 DROPS, SHORTCUTS, PULLS, DONE = range(4)
@@ -52,7 +52,7 @@ FINISHED, UNDECIDED, PAUSED = range(3)
 STAGE, SIZE = 0, 1
 BASE, CANDIDATE, KEPT = 2, 3, 4  # start and end vertex of the proposed edge, index of the last kept vertex
 ATTEMPT, FAILURES, FIRST, LAST = 2, 3, 4, 5  # attempts, consecutive failures, vertices before the ends of the shortcut
-PULL_ROUND, VERTEX, HAS_MOVED, CHECKS_SECOND_EDGE = 2, 3, 4, 5  # whether the pulled vertex's outgoing edge is checked
+PULL_ROUND, VERTEX, HAS_MOVED, CHECKS_SECOND_EDGE = 2, 3, 4, 5  # last: whether the second edge is checked
 
 
 class Shortening(NamedTuple):
@@ -202,7 +202,7 @@ def _apply_shortcut_verdict(shortening: Shortening, is_free: bool) -> None:
         progress[FAILURES] += 1
         return
     first, last = progress[FIRST], progress[LAST]
-    index_shift = first + 2 - last  # of the vertices after the shortcut, whose two ends replace the vertices in between
+    index_shift = first + 2 - last  # index change of the vertices after the shortcut
     if index_shift > 0:
         for index in range(progress[SIZE] - 1, last, -1):
             path[index + index_shift] = path[index]

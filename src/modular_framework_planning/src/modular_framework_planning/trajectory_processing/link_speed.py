@@ -21,7 +21,7 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 SAMPLE_PERIOD_S = 0.005  # sampling period of the link speed
 MAX_SAMPLES = 20_000
-EASE_S = 0.1  # duration of the transition on both sides of a slowed stretch
+EASE_S = 0.1  # duration of the transition before and after a slowed section
 MAX_SLOWED_PERIOD_S = 2.5 * MAX_PERIOD_S
 
 
@@ -85,7 +85,7 @@ def _slowed_smoothly(trajectory: Trajectory, times: Array, slowing: Array) -> Tr
     from scipy.interpolate import CubicSpline
 
     factors = np.maximum(slowing, 1.0)
-    slowed_times = cumulative_trapezoid(factors, times, initial=0.0)  # new times without smoothing of the factor
+    slowed_times = cumulative_trapezoid(factors, times, initial=0.0)  # new times before the speed factor is smoothed
     samples = np.linspace(0.0, slowed_times[-1], min(int(slowed_times[-1] / SAMPLE_PERIOD_S), MAX_SAMPLES) + 20)
     half_width = max(2, int(min(EASE_S, 0.25 * slowed_times[-1]) / samples[1]))
     slowdown = CubicSpline(

@@ -77,11 +77,11 @@ class Trajectory:
         return curve_values(np.ascontiguousarray(self.times, dtype=float), self.coefficients, wanted, orders)
 
     def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
-        """Returns uniform times from start to end, including both, at most `period_s` apart."""
+        """Returns uniform times from start to end, inclusive, with a spacing of at most `period_s`."""
         return np.linspace(0.0, self.duration_s, int(np.ceil(self.duration_s / period_s)) + 1)
 
     def curve(self, step: float) -> Array:
-        """Returns positions along the curve at most about `step` apart in every joint [rad or m]."""
+        """Samples positions along the curve, with joint steps of about `step` at most [rad or m]."""
         if len(self.times) < 2:
             return self.positions
         times, positions, velocities = (

@@ -41,12 +41,12 @@ from modular_framework_ros.publishing import publish
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
-TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
+TEXT_ABOVE_TIP_M = 0.45  # keeps the text clear of the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # maximum wait of a plan for a dragged goal
 BASE_SCALE = 3.0  # size of the base's marker relative to the tip's marker
 MIN_STATE_CHANGE = 1.0e-3  # [rad or m]; smaller motions of the robot do not move the goal
-FOLLOW_PERIOD_S = 0.5  # of updates of a goal that follows the robot
+FOLLOW_PERIOD_S = 0.5  # update period of a goal that follows the robot
 JOB_END_S = 0.2  # maximum wait for a finished job to release the lock
 DEFAULT_PLANNER = "move_group's default"
 

@@ -20,12 +20,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
 )
 from modular_framework_planning.geometry.spatial import Array
 
-SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # types of closed forms; SURFACE is none
+SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # closed forms; SURFACE: none
 CLEAR, TOUCHING, TOO_CLOSE = range(3)
 
-MIN_PIECE_RADIUS_M = 1.0e-4  # radius down to which triangles are cut before a pair counts as too close to decide
+MIN_PIECE_RADIUS_M = 1.0e-4  # triangles are split down to this radius before a pair counts as undecided
 ROUNDING = 1.0e-6  # [m]; tolerance for the exact checker and for floating point
-MIN_USEFUL_FRACTION = 0.3  # a bound below this fraction of the required distance certifies too little to refine
+MIN_USEFUL_FRACTION = 0.3  # bounds below this fraction of the required distance are not worth refining
 MAX_RADIUS_FRACTION = 0.5  # a sphere is not subdivided if its radius is at most this fraction of its distance
 MAX_PIECES = 4000
 MAX_NODE_PAIRS = 50_000  # node pairs visited per table cell
@@ -203,7 +203,7 @@ def _triangle_to_solid(
             continue
         if centre < -ROUNDING - excess:
             return TOUCHING, 0.0
-        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no part of the piece is deep enough
+        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no part of the triangle is deep enough
             return TOO_CLOSE, 0.0
         if radius <= MAX_RADIUS_FRACTION * centre or radius <= MIN_PIECE_RADIUS_M < centre - ROUNDING:
             limit = centre - radius
@@ -455,7 +455,7 @@ def _motion_in_rotations(
 def surfaces_stay_apart(
     surface: Surfaces, root: int, other_surface: Surfaces, other_root: int, pose: Array, rotations: Rotations
 ) -> bool:
-    """Returns whether two surfaces provably stay apart while the first surface rotates.
+    """Returns whether a rotation of the first surface is proven collision-free.
 
     Args:
         surface: Trees with the first surface.

@@ -26,7 +26,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.geometry.spatial import Array
 
-NEAREST_SOLIDS = 6  # stored per cell
+NEAREST_SOLIDS = 6  # solids stored per cell
 
 
 class DistanceField(NamedTuple):
@@ -102,7 +102,7 @@ def field_cell(field: DistanceField, x: float, y: float, z: float) -> tuple[int,
     u, v, w = (x - grid[0]) / edge, (y - grid[1]) / edge, (z - grid[2]) / edge
     if not (
         0.0 <= u < is_filled.shape[0] and 0.0 <= v < is_filled.shape[1] and 0.0 <= w < is_filled.shape[2]
-    ):  # also for NaN
+    ):  # NaN also takes this branch
         return -1, 0, 0, 0.0
     i, j, k = int(u), int(v), int(w)
     u, v, w = grid[0] + (i + 0.5) * edge, grid[1] + (j + 0.5) * edge, grid[2] + (k + 0.5) * edge

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collision checks of straight joint motions for compiled planners, with a memory of verdicts."""
+"""Collision checks of straight joint motions for compiled planners, with a cache of results."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 )
 from modular_framework_planning.geometry.spatial import Array
 
-UNKNOWN, FREE, BLOCKED = 0, 1, 2  # verdicts on an edge
-MEMORY_CAPACITY = 256  # edges; searching them takes less than 1 % of a check
+UNKNOWN, FREE, BLOCKED = 0, 1, 2  # results of an edge check
+MEMORY_CAPACITY = 256  # number of cached edges; a look-up takes less than 1 % of a check
 
 
 class GroupEdges(NamedTuple):
@@ -47,7 +47,7 @@ class EdgeMemory(NamedTuple):
     Attributes:
         ends: Start and end joint vector of each edge, shape (capacity, 2, joints) [rad or m].
         steps: Step of each check, shape (capacity,) [rad or m].
-        verdicts: FREE or BLOCKED, shape (capacity,).
+        verdicts: Result per cached edge, FREE or BLOCKED, shape (capacity,).
         total: Number of edges ever stored, shape (1,).
     """
 
@@ -69,7 +69,7 @@ def new_memory(joints: int) -> EdgeMemory:
 
 @njit(cache=True, nogil=True)
 def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
-    """Returns the remembered verdict on an edge: FREE, BLOCKED, or UNKNOWN.
+    """Returns the cached result of an edge: FREE, BLOCKED, or UNKNOWN.
 
     Args:
         memory: Edge memory.
@@ -91,7 +91,7 @@ def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
 
 @njit(cache=True, nogil=True)
 def remember(memory: EdgeMemory, start: Array, end: Array, step: float, verdict: int) -> None:
-    """Stores the verdict on an edge.
+    """Stores the result of an edge.
 
     Args:
         memory: Edge memory.
@@ -154,7 +154,7 @@ def check_edge(
 
 @njit(cache=True, nogil=True)
 def check_edges(edges: GroupEdges, motions: Array, *world: NDArray[Any]) -> NDArray[np.int64]:
-    """Returns the verdict of `check_edge` for each motion.
+    """Returns the result of `check_edge` for each motion.
 
     Args:
         edges: Relation of the group to the whole robot, and the step.

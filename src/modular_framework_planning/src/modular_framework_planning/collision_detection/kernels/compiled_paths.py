@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collision checks of whole paths, compiled: the clearance at one state certifies a stretch of the path.
+"""Compiled collision checks of whole paths: the clearance at one state certifies a section of the path.
 
-If two bodies have clearance c at a state, the pair stays apart until the bodies move by c relative to each other. The
+If two bodies have clearance c at a state, the pair cannot collide until the bodies move by c relative to each other.
+The
 motion of a body is bounded by the sum over joints of joint motion times the body's distance from the joint axis. Only
 evaluated samples are computed, so that a fine step costs no more than a coarse step far from obstacles.
 """
@@ -47,7 +48,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
 INITIAL_UNDECIDED_ROWS = 256
-MAX_MOTION_M = 0.2  # a stretch with a longer body motion is halved without computing clearances
+MAX_MOTION_M = 0.2  # sections with a longer body motion are halved before clearances are computed
 
 
 class Samples(NamedTuple):
@@ -132,7 +133,7 @@ def _write_joint_ranges(
 
 
 class Stretch(NamedTuple):
-    """State at the middle sample of a stretch of a path, and motion bounds over the stretch.
+    """State at the middle sample of a section of a path, and motion bounds over the section.
 
     Attributes:
         placements: Poses of the joints at the sample, shape (joints, 3, 4).
@@ -140,9 +141,9 @@ class Stretch(NamedTuple):
         centres: Centres of the bounding spheres at the sample, shape (b, 3) [m].
         axes: Point and direction of each joint axis at the sample, shape (joints, 6).
         sample_ranges: Joint positions at the sample, twice; shape (2, joints) [rad or m].
-        joint_ranges: Minimum and maximum joint positions on the stretch, shape (2, joints) [rad or m].
+        joint_ranges: Minimum and maximum joint positions on the section, shape (2, joints) [rad or m].
         change: Maximum joint motion from the sample to either end, shape (joints,) [rad or m].
-        signs: Direction of each joint's motion, 1 or -1; all 0 if the stretch is not straight; shape (joints,).
+        signs: Direction of each joint's motion, 1 or -1; all 0 if the section is not straight; shape (joints,).
         motions: Maximum motion of any point of each body from the sample to either end, shape (b,) [m].
         rows: Working memory, shape (3, joints).
     """
@@ -171,7 +172,7 @@ class Workspace(NamedTuple):
     """Working memory of a path check.
 
     Attributes:
-        stretch: State and motion bounds of the current stretch.
+        stretch: State and motion bounds of the current section.
         memory: Working memory of a pair check.
         order: Watched pairs, the pair that touched last first.
     """
@@ -196,13 +197,13 @@ def release(workspace: Workspace) -> None:
 
 @njit(cache=True, nogil=True)
 def evaluate_middle(world: World, samples: Samples, low: int, high: int, is_first: bool, stretch: Stretch) -> float:
-    """Places the bodies at the middle sample of a stretch and bounds their motion to both ends.
+    """Places the bodies at the middle sample of a section and bounds their motion to both ends.
 
     Args:
         world: Bodies and pairs.
         samples: Samples of the path.
-        low: First sample of the stretch.
-        high: Last sample of the stretch.
+        low: First sample of the section.
+        high: Last sample of the section.
         is_first: Whether this is the first evaluated sample; only then are bodies of the world placed.
         stretch: Filled; the motion bounds only if `low` and `high` differ.
 
@@ -290,7 +291,7 @@ def _motion_of(
     including the motion caused by the joints between j and the body.
 
     - Sum of arc lengths: M = sum d_j R_j.
-    - On a straight stretch, first-order motion plus second-order remainder: |v| + sum d_j (M_j + d_j R_j / 2), where
+    - On a straight section, first-order motion plus second-order remainder: |v| + sum d_j (M_j + d_j R_j / 2), where
       M_j is the part of M caused by the joints between j and the body. With the signs of the motions,
       |v| <= |sum d_j a_j x (c - o_j)| + r |sum d_j a_j|, so that opposite rotations cancel.
     """
@@ -396,8 +397,8 @@ def check_path(world: World, samples: Samples, first: int, undecided: NDArray[np
         undecided: Filled with rows (sample, pair) that are too close to decide, shape (n, 2).
 
     Returns:
-        TOUCHING and the index of a touching sample; TOO_CLOSE and the count of undecided rows, which exceeds n if they
-        do not fit; or CLEAR and the count of evaluated samples.
+        TOUCHING and the index of a touching sample; TOO_CLOSE and the number of undecided rows, above n if the rows do
+        not fit; or CLEAR and the number of evaluated samples.
     """
     workspace = new_workspace(world)
     result = check_samples(world, borrowed(samples), first, undecided, borrowed(workspace))

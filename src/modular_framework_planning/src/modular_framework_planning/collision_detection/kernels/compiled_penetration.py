@@ -29,9 +29,9 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
-TOUCH_COST_M = 0.03  # added to the depth of every contact, so that the cost of contact starts with a step
+TOUCH_COST_M = 0.03  # added to the depth of every contact, so that touching without depth has a cost
 MAX_SPHERE_RADIUS_M = 0.07
-CONTACT_DISTANCE_M = 1.0e-5  # closer bodies count as touching
+CONTACT_DISTANCE_M = 1.0e-5  # closer bodies are in contact
 
 
 class BoundingSpheres(NamedTuple):
@@ -122,7 +122,7 @@ def penetrations(world: World, bounding: BoundingSpheres, states: Array) -> Arra
         has_spheres = False
         for pair in range(len(world.pairs)):
             if world.pairs[pair, 1] == FIELD:
-                break  # field pairs only represent pairs already checked
+                break  # the distance field contains only pairs that are already checked
             status, _ = pair_bound(world, pair, poses, centres, CONTACT_DISTANCE_M, memory)
             if status == CLEAR:
                 continue

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables over two joints that show whether a pair of links stays apart; cells are filled on first use."""
+"""Lookup tables of collision-free joint ranges for pairs of links; cells are computed on first use."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
-MAX_CELLS = 12  # looked up per stretch of a path
+MAX_CELLS = 12  # maximum number of cells per lookup
 
 
 @njit(cache=True, nogil=True)
 def _fill_cell(world: World, table: int, pair: int, row: int, column: int) -> None:
-    """Determines whether two links stay apart in a whole cell of their table."""
+    """Determines whether two links are collision-free in an entire cell of their table."""
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     if world.joints[first] < world.joints[second]:
         first, second = second, first  # the first link moves relative to the second
@@ -78,9 +78,9 @@ def _cells(joint_ranges: Array, joint: int) -> tuple[int, int]:
 
 @njit(cache=True, nogil=True)
 def table_verdict(tables: NDArray[np.int8], table: int, joints: NDArray[np.int64], joint_ranges: Array) -> int:
-    """Returns the verdict of a table on its links while the joints stay within their ranges.
+    """Looks up whether two links are collision-free within joint ranges.
 
-    APART is certain. NEAR can also mean too many cells to look up; UNKNOWN means that a cell is not yet filled.
+    APART is proven. NEAR can also mean too many cells to look up; UNKNOWN means that a cell is not yet filled.
 
     Args:
         tables: All tables, see World.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from modular_framework_planning.geometry.spatial import Array
 
 CENTRING_STEPS = 12
-RAY = (0.4613, 0.5417, 0.7027)  # unit vector (within 1e-4) that hardly any mesh has edges along
+RAY = (0.4613, 0.5417, 0.7027)  # unit vector (within 1e-4) that is parallel to hardly any mesh edge
 
 
 class Surfaces(NamedTuple):

@@ -40,7 +40,7 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Lines:
-    """A parsed request; `offset` is the pose of `follower`, which follows the lines, in the frame of `link`."""
+    """A parsed request; `follower` moves along the lines, and `offset` is its pose in the frame of `link`."""
 
     scene: PlanningScene
     group: JointGroup

@@ -15,7 +15,7 @@ from modular_framework_planning.move_group.goal_runner import error_code_of
 from modular_framework_planning.move_group.planning_options import check_options, scene_change
 from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
-MIN_REPLAN_DELAY_S = 0.05  # between attempts, so that immediate failures do not flood the log
+MIN_REPLAN_DELAY_S = 0.05  # pause between attempts, so that immediate failures do not flood the log
 RETRYABLE_CODES = (
     ErrorCode.PLANNING_FAILED,
     ErrorCode.INVALID_MOTION_PLAN,

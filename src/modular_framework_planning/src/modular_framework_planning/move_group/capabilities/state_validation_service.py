@@ -18,7 +18,7 @@ from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
-_LOG_PERIOD_S = 5.0  # of identical messages, since clients check many states in a row
+_LOG_PERIOD_S = 5.0  # cached messages; clients often check many states with identical messages
 
 
 class StateValidationService(ServiceCapability):

@@ -28,7 +28,7 @@ class TfPublisher(MoveGroupCapability):
         self._prefix = parameter("~planning_scene_tf_prefix").rstrip("/")
 
     def connect(self) -> None:
-        """Starts to broadcast."""
+        """Starts broadcasting."""
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._timer = rospy.Timer(rospy.Duration(1.0 / self._rate_hz), self._publish)
 

@@ -28,7 +28,7 @@ ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperComma
 
 
 class RunningMotion(Protocol):
-    """A motion that one controller executes."""
+    """Motion of a single controller."""
 
     def is_done(self) -> bool:
         """Returns whether the controller has reported success; raises PlanningError if the motion failed."""

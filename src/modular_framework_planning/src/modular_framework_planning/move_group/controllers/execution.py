@@ -193,7 +193,7 @@ class TrajectoryExecution:
             self.manager.prepare(parts)
             try:
                 self._run(parts, self.manager, _delay_s(motion), cancelled, stop)
-            finally:  # also after a stop, because the next goal starts at the robot's rest position
+            finally:  # stops too, because the next goal starts at the robot's rest position
                 if self.settings.wait_for_trajectory_completion and not rospy.is_shutdown():
                     self._settle(motion.joint_names)
 

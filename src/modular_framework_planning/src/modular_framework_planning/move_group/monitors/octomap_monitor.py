@@ -35,7 +35,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 DEFAULT_RESOLUTION = 0.1  # [m]
 ATTEMPTS = 3
-WAIT_S = 1.0  # for transforms and joint positions at the time of a sensor message
+WAIT_S = 1.0  # wait for transforms and joint positions at the time of a sensor message
 
 
 class OctomapMonitor:

@@ -250,7 +250,7 @@ class SceneMonitor:
     def wait_for_next_state(self, timeout_s: float) -> bool:
         """Waits for the next joint_states message; returns False on timeout.
 
-        If simulated time can be held, the method lets STATE_PERIOD_S of it pass and waits for the state after that.
+        If simulated time can be held, the method advances the time by STATE_PERIOD_S and waits for the next state.
         """
         if self.time.enabled:
             self.time.sleep(STATE_PERIOD_S)

@@ -15,7 +15,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 
 TIGHT_FRACTION = 0.1  # constraints are tight if a smaller fraction of random states satisfies them
 TIGHTNESS_SAMPLES = 100
-STATES_PER_CHECK = 4  # states of a walk between two collision checks
+STATES_PER_CHECK = 4  # maximum number of states of a walk between two collision checks
 NAME = "CBiRRT"
 
 
@@ -94,7 +94,7 @@ class ConstrainedSearch:
         goals = problem.goal_states() if self._goals is None else self._goals
         trees = _Tree(problem.start_values[None, :]), _Tree(goals)
         while not self._is_over():
-            forward = len(trees[0].values) <= len(trees[1].values)  # balanced trees also explore the narrower end
+            forward = len(trees[0].values) <= len(trees[1].values)  # both ends are explored equally
             growing, other = trees if forward else trees[::-1]
             reached = self._grow(growing, problem.rng.uniform(self._low, self._high))
             connected = self._grow(other, growing.values[reached])
@@ -108,11 +108,11 @@ class ConstrainedSearch:
         return self._states >= self._max_states or self._problem.interrupted()
 
     def _grow(self, tree: _Tree, target: Array) -> int:
-        """Walks from the nearest vertex towards a target as far as possible; returns the index of the last vertex."""
+        """Extends the tree towards a target as far as possible; returns the index of the last vertex."""
         index = tree.nearest(target)
         while not self._is_over():
             states = self._motion.steps_towards(tree.values[index].copy(), target, STATES_PER_CHECK)
-            self._states += max(1, len(states))  # an empty walk counts as a state, so that max_states ends the search
+            self._states += max(1, len(states))  # an empty walk also counts, so that the search ends
             for state in states:
                 if not self._problem.motion.edge_is_free(tree.values[index], state, self._step):
                     return index

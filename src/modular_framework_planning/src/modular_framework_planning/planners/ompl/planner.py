@@ -40,8 +40,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # limits of the search for a detour around one edge
-LARGE_GROUP = 10  # joints of a group, such as two arms, whose searches are long enough for parallel threads
-MAX_THREADS = 4  # default limit, because every additional search saves less time
+LARGE_GROUP = 10  # minimum number of joints for parallel searches, such as two arms
+MAX_THREADS = 4  # default limit; every additional search saves less time
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
@@ -107,7 +107,8 @@ class OmplPlanner:
 def _stages(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProblem, Array]]:
     """Returns the problem and goals of each search stage.
 
-    Continuous joints rotate to their goals the short way. If half of the time finds no path, both ways are allowed.
+    Continuous joints rotate to their goals in the shorter direction. If no path is found in half of the time, both
+    directions are allowed.
     """
     long_way_goals = problem.long_way_goals(goals)
     if not len(long_way_goals):

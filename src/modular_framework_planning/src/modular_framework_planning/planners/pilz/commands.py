@@ -103,7 +103,7 @@ def along_path(
 
 
 def _posture_between(motion: TimedPath, start: Array, goal: Array) -> Posture:
-    """Returns the preferred postures of a redundant arm on the way to a joint goal."""
+    """Returns the preferred postures of a redundant arm during the motion to a joint goal."""
 
     def posture(time_s: float) -> JointState:
         progress = (float(values[0]) / motion.profile.distance for values in motion.profile.sample(np.array([time_s])))

@@ -20,7 +20,7 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 CHECK_PERIOD_S = 0.01  # period of the joint limit checks
 MAX_CHECKS = 4000
 DIFFERENCE_STEP_S = 1.0e-5  # step of the numeric derivatives of a pose
-LIMIT_TOLERANCE = 1.0e-3  # fraction of a limit
+LIMIT_TOLERANCE = 1.0e-3  # tolerance, as a fraction of a limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)

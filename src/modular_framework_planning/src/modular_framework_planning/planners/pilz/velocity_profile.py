@@ -106,7 +106,7 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
 def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
     """Returns the times of trajectory points: periodic times, knots and the end, in whole nanoseconds.
 
-    Points are at least 0.1 ms apart: a knot replaces a periodic time that is closer.
+    The minimum spacing of points is 0.1 ms: a knot replaces a periodic time that is closer.
 
     Args:
         duration_s: Duration of the motion [s].

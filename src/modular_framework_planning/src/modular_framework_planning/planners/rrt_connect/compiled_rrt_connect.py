@@ -8,8 +8,8 @@ other. A state whose extension was blocked accepts only nearby samples, as in Ye
 Dynamic-domain RRTs, ICRA 2005. Otherwise an enclosed tree keeps extending into the same obstacle.
 
 With a length bound the search accepts only shorter paths, as in Hauser, Zhou: Asymptotically optimal planning by
-feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016: each sample gets a random maximum path length and
-is reached only from states that respect that length.
+feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016: each sample gets a random maximum path length, and
+only states that respect this length can be its parent.
 
 The loop returns to the interpreter for new samples, for larger trees, for an edge that the compiled check leaves
 undecided, and regularly to read the clock.
@@ -43,8 +43,8 @@ from modular_framework_planning.geometry.spatial import Array
 # Return values of `grow`
 FOUND, NEEDS_SAMPLES, NEEDS_CAPACITY, UNDECIDED, PAUSED, LIMIT_REACHED = range(6)
 EXTEND, CONNECT = 0, 1
-NEAREST_UNKNOWN = -1  # the nearest state to a new target has not been searched yet
-EDGES_PER_CALL = 200  # edge checks after which the caller checks the clock and cancellation
+NEAREST_UNKNOWN = -1  # the state nearest to the target is not known yet
+EDGES_PER_CALL = 200  # the caller checks the time and cancellation after this number of edge checks
 
 
 class Trees(NamedTuple):

@@ -39,16 +39,14 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 SAMPLE_BATCH = 256  # most samples fall outside the dynamic domain and are rejected cheaply
-MIN_WEIGHT = (
-    0.1  # lower limit of a joint's weight, so that an extension moves no joint farther than ten times the range
-)
+MIN_WEIGHT = 0.1  # lower limit of a joint's weight; limits the joint motion of an extension to ten times the range
 INITIAL_TREE_CAPACITY = 1024
 # The squared radius of the dynamic domain lies DOMAIN_DEVIATIONS standard deviations below the mean squared distance of
 # two random states, because in 14 dimensions hardly any sample lies within a few extensions. The radius is at least
 # MIN_DOMAIN_EXTENSIONS extensions (as in VAMP). Tuned on MotionBenchMaker's problems of a UR5, a Panda, a Fetch and a
 # two-armed Baxter.
 MIN_DOMAIN_EXTENSIONS, DOMAIN_DEVIATIONS = 4.0, 1.72
-FULL_BOUNDS_PERIOD = 8  # every eighth batch of samples covers the full bounds, the others the range around the ends
+FULL_BOUNDS_PERIOD = 8  # period [batches] of samples over the full bounds, not only around start and goal
 
 
 def can_search(problem: PlanningProblem) -> bool:
@@ -101,7 +99,7 @@ class TreeGrowth:
         max_extension: Maximum length of an extension [rad or m], weighted if `is_weighted`.
         extension_limit: Maximum number of extensions to random states; None for no limit but time.
         is_weighted: Whether the weight of a joint is the square root of its reach, relative to the largest
-            reach. A wrist then turns farther per extension than a shoulder. Otherwise all weights are 1.
+            reach. A wrist then rotates farther per extension than a shoulder. Otherwise all weights are 1.
     """
 
     check_step: float
@@ -172,7 +170,7 @@ class RrtConnect:
 
     def grow(self) -> None:
         """Grows the trees until they meet or the search pauses; searches may grow in parallel threads."""
-        if self._status != UNDECIDED:  # an undecided edge continues the same round
+        if self._status != UNDECIDED:  # the round continues after an undecided edge
             self._trees.counts[3] = self._trees.counts[0] + EDGES_PER_CALL
         self._status = grow(self._trees, self._space, self._samples, self._verdict, *self._world)
         self._verdict = UNKNOWN
@@ -311,7 +309,7 @@ class ParallelSearch:
         problem, searches = self._problem, self._searches
         while searches:
             growing = searches
-            while growing:  # a round has the same extent however many edges are undecided
+            while growing:  # undecided edges do not count, so that all rounds have the same length
                 for _ in map_searches(RrtConnect.grow, growing):
                     pass
                 growing = [search for search in growing if search.is_undecided and not problem.interrupted()]

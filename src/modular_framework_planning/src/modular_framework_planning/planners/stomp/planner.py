@@ -18,8 +18,8 @@ from modular_framework_planning.planning_interface.planning_request import Pipel
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 BOW_STDDEV = 1.0  # standard deviation of the curved initial guess of later attempts [rad or m]
-NOISE_DECAY = 0.93  # factor of the noise after an iteration without progress
-NOISE_SCALES = (1.0, 0.5, 0.25)  # factors of the noise of consecutive copies
+NOISE_DECAY = 0.93  # noise factor after an iteration without progress
+NOISE_SCALES = (1.0, 0.5, 0.25)  # noise factors of consecutive copies
 
 
 class StompPlanner:

@@ -16,7 +16,7 @@ class RequestAdapter:
     """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans through the rest of the chain.
+        """Plans with the remaining adapters and the planner.
 
         Args:
             problem: Planning problem, modified by the outer adapters; parameters are in `problem.settings`.
