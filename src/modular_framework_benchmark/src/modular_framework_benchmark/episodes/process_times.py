@@ -1,40 +1,43 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures the processor time of ROS nodes through /proc, without relying on the nodes' own reports."""
+"""Measures the processor time of a method from outside, without relying on the method's own reports."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Collection
-from pathlib import Path
+import contextlib
 
-from modular_framework_core.launching.launch_session import processes_with
+import psutil
+
+from modular_framework_benchmark.episodes.method_node import COMMAND
 
 
-def processor_time_s(nodes: Collection[str]) -> float:
-    """Returns the processor time that nodes of this process's ROS session have used so far [s].
+def processor_time_s(launch: int) -> float:
+    """Returns the processor time that the nodes of a method have used so far [s].
 
-    The process trees count completely: children, ended children that were waited for, and processes that left their
-    parent but not the Unix session that roslaunch opens for each node. A process that left both (a daemon) counts too:
-    nodes of the framework start no daemons.
+    All descendants of `method_node` count, including daemons, and ended processes that were waited for. A node that
+    roslaunch starts again counts from its restart.
 
     Args:
-        nodes: Absolute names of the nodes.
+        launch: Process id of the launch that starts the nodes; 0.0 if the launch has ended.
     """
-    marks = {f"__name:={name.rpartition('/')[2]}".encode() for name in nodes}
-    processes = processes_with("ROS_HOME", os.environ["ROS_HOME"]) if nodes else []
-    known_parents = {*processes, os.getpid(), os.getppid()}  # the parent of this process starts roslaunch
-    trees: set[int] = set()
-    ticks = 0
-    for process in sorted(processes):  # parents first
-        folder = Path("/proc", str(process))
-        try:
-            words = set((folder / "cmdline").read_bytes().split(b"\0"))
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()  # starts at the third field, see proc(5)
-        except OSError:  # the process has ended
-            continue
-        parent, session = int(fields[1]), int(fields[3])
-        is_daemon = parent not in known_parents and (session == process or session not in known_parents)
-        if marks & words or trees & {parent, session} or is_daemon:
-            trees |= {process, session}
-            ticks += sum(map(int, fields[11:15]))
-    return ticks / os.sysconf("SC_CLK_TCK")
+    used_s = 0.0
+    for process in _children(launch):
+        with contextlib.suppress(psutil.Error):  # the process has ended
+            if COMMAND[-1] in process.cmdline():
+                used_s += sum(map(_time_s, [process, *process.children(recursive=True)]))
+    return used_s
+
+
+def _children(launch: int) -> list[psutil.Process]:
+    try:
+        return psutil.Process(launch).children()
+    except psutil.Error:
+        return []
+
+
+def _time_s(process: psutil.Process) -> float:
+    """Returns the processor time of a process and of its ended children [s]; 0.0 if the process has ended."""
+    try:
+        times = process.cpu_times()
+    except psutil.Error:
+        return 0.0
+    return times.user + times.system + times.children_user + times.children_system

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Process beside a stack that runs its episodes: spawns the objects, starts the task, records, checks the result.
 
-Standard input carries requests and standard output carries answers, one line of JSON each.
+    python3 -m modular_framework_benchmark.episodes.ros_episode_recorder LAUNCH
+
+LAUNCH is the process id of the stack's launch. Standard input carries requests and standard output carries answers, one
+line of JSON each.
 `{"folder": ..., "objects": [...], ...}` runs an episode, see `EpisodeRequest`; `{"abort": true}` aborts the episode.
 """
 
@@ -98,13 +101,14 @@ class EpisodeRequest:
 class EpisodeRecorder:
     """Runs the episodes of a stack."""
 
-    def __init__(self, aborted: threading.Event) -> None:
+    def __init__(self, aborted: threading.Event, launch: int) -> None:
         """Stores the arguments without connecting.
 
         Args:
             aborted: Event that aborts the episode.
+            launch: Process id of the stack's launch.
         """
-        self._aborted = aborted
+        self._aborted, self._launch = aborted, launch
         self._samples = Samples()
         self._time = SimulatedTime()
 
@@ -181,7 +185,7 @@ class EpisodeRecorder:
                 spawn(placed)
             answer["interventions"] = judge().number
 
-        answer["processor_before_s"] = processor_time_s(request.method_nodes)
+        answer["processor_before_s"] = processor_time_s(self._launch)
         if self._time.enabled:
             begin_episode(spawn_all, SETTLE_S)
         else:
@@ -203,7 +207,7 @@ class EpisodeRecorder:
         try:
             self._wait(lambda: bool(self._samples.ends))
         finally:  # also of an episode that is aborted at its time limit
-            answer["method_processor_s"] = processor_time_s(request.method_nodes) - answer["processor_before_s"]
+            answer["method_processor_s"] = processor_time_s(self._launch) - answer["processor_before_s"]
         end = self._samples.ends[-1]
         if end["frozen"]:
             raise InterferenceError(end["frozen"])
@@ -318,7 +322,7 @@ def main() -> int:
         aborted.set()
 
     threading.Thread(target=read, daemon=True).start()
-    recorder, connected = EpisodeRecorder(aborted), False
+    recorder, connected = EpisodeRecorder(aborted, launch=int(sys.argv[1])), False
     while (request := requests.get()) is not None:
         try:
             if not connected:

@@ -96,10 +96,11 @@ class Stack:
         self._launch = self._session.start(
             [
                 *(sys.executable, "-m", LAUNCHER, launch.package, launch.launch_file, str(parameters_file)),
+                ",".join(launch.method_nodes),
                 *(f"{name}:={value}" for name, value in launch.arguments.items()),
             ]
         )
-        self._recorder = Recorder(self._session.env, self._session.folder / "recorder.txt")
+        self._recorder = Recorder(self._session.env, self._session.folder / "recorder.txt", self._launch.process.pid)
         self._log_end = 0
 
     def write_log(self, path: Path) -> None:
@@ -173,17 +174,18 @@ class Stack:
 class Recorder:
     """Process of the recorder, which receives requests and sends answers, one line of JSON each."""
 
-    def __init__(self, env: Mapping[str, str], log_path: Path) -> None:
+    def __init__(self, env: Mapping[str, str], log_path: Path, launch: int) -> None:
         """Starts the process.
 
         Args:
             env: Environment of the session.
             log_path: File for the standard error output.
+            launch: Process id of the stack's launch.
         """
         self._log_path = log_path
         with log_path.open("w") as log_file:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", RECORDER],
+                [sys.executable, "-m", RECORDER, str(launch)],
                 env=dict(env),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import rosgraph
 import roslaunch
+import roslaunch.config
 import roslaunch.core
 import roslaunch.loader
 import roslaunch.parent
@@ -104,6 +105,7 @@ def run_launch(
     task_name: str,
     leaves_nodes: bool = False,
     faults: Callable[[str, list[str]], Sequence[str]] = lambda path, arguments: (),
+    prepare: Callable[[roslaunch.core.Node], None] = lambda node: None,
 ) -> int:
     """Runs a launch file until its task ends or a node dies, and prints the reason at the end.
 
@@ -113,6 +115,7 @@ def run_launch(
         leaves_nodes: Whether to exit at once at the end, so that the caller must stop the remaining nodes.
         faults: Function that returns the faults of the names in a launch file and its arguments. Faults prevent the
             start.
+        prepare: Function that may change each node of the launch file before the start.
 
     Returns:
         The task's exit code, EXIT_NODE_DIED if another node died first, or EXIT_BAD_LAUNCH for an invalid launch file
@@ -137,6 +140,9 @@ def run_launch(
         parent = roslaunch.parent.ROSLaunchParent(
             uuid, files, process_listeners=[watcher], port=_master_port(), show_summary=False
         )
+        parent.config = roslaunch.config.load_config_default(files, parent.port)
+        for node in parent.config.nodes:
+            prepare(node)
         watcher.parent = parent
         parent.start()
         parent.spin()

@@ -15,6 +15,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import urlparse
 
+import psutil
+
 STOP_TIMEOUT_S = 15.0
 """Timeout of a stopping launch before it is killed [s]."""
 
@@ -30,21 +32,24 @@ def free_port() -> int:
 
 
 def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]:
-    """Returns the IDs of all other processes with an environment variable of a given value.
+    """Returns the IDs of all other processes with an environment variable of a given value, and of their descendants.
 
     Args:
         variable: Name of the environment variable.
         value: Value of the variable.
         prefix: Whether `value` is a prefix of the variable's value.
     """
-    mark, process_ids = f"{variable}={value}".encode(), []
+    mark, found = f"{variable}={value}".encode(), set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # process ended or belongs to another user
             entries = (folder / "environ").read_bytes().split(b"\0")
             marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
             if marked and int(folder.name) != os.getpid():
-                process_ids.append(int(folder.name))
-    return process_ids
+                found.add(int(folder.name))
+    parents = {process.pid: process.info["ppid"] for process in psutil.process_iter(["ppid"])} if found else {}
+    while children := {process_id for process_id, parent in parents.items() if parent in found} - found:
+        found |= children
+    return sorted(found - {os.getpid()})
 
 
 def kill_processes_with(variable: str, value: str, prefix: bool = False, timeout_s: float = math.inf) -> int:
