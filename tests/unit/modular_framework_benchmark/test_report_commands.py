@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -163,6 +164,24 @@ def test_a_report_says_how_many_episodes_were_the_first_of_their_stack(tmp_path:
     assert report([stored_with_block(tmp_path / "results.db", 5), "--into", str(page)]) == 0
     count = sum(record.spec.trial % 5 == 0 for record in RUN.records())
     assert f"{count} of the episodes were the first of their stack" in page.read_text()
+
+
+def test_a_restricted_mean_without_an_interval_says_how_many_episodes_it_needs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planners = (RUN.planners[0], *((name, 0.3, time_s) for name, _, time_s in RUN.planners[1:]))
+    path = stored(tmp_path, "results.db", replace(RUN, trials=6, planners=planners))
+    notes = Page.of(Path(path), tmp_path / "report.html").text
+    printed = capsys.readouterr().out
+    with open_database(path) as database:
+        episodes = database.load(1).episodes
+    succeeded = episodes.groupby("motion_planner")["success"].sum()
+    few = succeeded[[planner for planner in ("bitstar", "stomp") if 0 < succeeded[planner] < 6]]
+    assert len(few) == 2 and succeeded["rrt_connect"] >= 6
+    # 6 successes are expected in 6 * 12 / k episodes, if 12 episodes have k
+    needed = " and ".join(f"{math.ceil(6 * 12 / number)} episodes of {planner}" for planner, number in few.items())
+    sentence = f"For an interval, the restricted mean of the task time needs about {needed}."
+    assert sentence in printed.splitlines() and sentence in notes
 
 
 def test_two_experiments_of_one_database_are_compared_by_name(

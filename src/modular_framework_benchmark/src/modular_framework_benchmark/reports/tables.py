@@ -27,7 +27,8 @@ from modular_framework_benchmark.statistics.comparison import (
     Verdict,
 )
 from modular_framework_benchmark.statistics.observations import SUCCESS as SUCCESS_METRIC
-from modular_framework_benchmark.statistics.sentences import enumeration
+from modular_framework_benchmark.statistics.sentences import enumeration, needed_episodes
+from modular_framework_benchmark.statistics.values import MIN_UNITS
 from modular_framework_ros.reported_figures import Source
 
 NO_BREAK = "\u00a0"
@@ -80,7 +81,11 @@ def table_text(table: Table) -> str:
 
 def answer_text(content: ReportContent) -> str:
     """Returns the summary at the top of a report as plain text."""
-    return "\n".join([table_text(answer_table(content)), "", *answer_sentences(content), content.analysis.scope])
+    main = _main_metric(content)
+    needed = _needed_episodes(content, [main] if main else [])
+    return "\n".join(
+        [table_text(answer_table(content)), "", *answer_sentences(content), *needed, content.analysis.scope]
+    )
 
 
 def overview_table(content: ReportContent) -> Table:
@@ -113,9 +118,29 @@ def _without_interval(content: ReportContent) -> str:
     return f"{without} of {counted(len(estimates), 'figure')} (rates, medians and differences) have no interval."
 
 
+def _main_metric(content: ReportContent) -> Metric | None:
+    """Returns the first metric of the experiment besides success."""
+    return next((item for item in content.description.metrics if item.name != SUCCESS), None)
+
+
+def _needed_episodes(content: ReportContent, metrics: Sequence[Metric]) -> list[str]:
+    """Returns a sentence for each mean that would have an interval with more episodes; none below MIN_UNITS units."""
+    sentences = []
+    for metric in metrics:
+        means = {
+            item.method: item.mean
+            for item in content.analysis.summaries
+            if item.metric == metric.name and item.mean is not None and item.counts.units >= MIN_UNITS
+        }
+        needed = {method: mean.needed_episodes for method, mean in means.items() if mean.needed_episodes is not None}
+        if needed:
+            sentences.append(needed_episodes(metric, means[next(iter(needed))].name, needed))
+    return sentences
+
+
 def answer_table(content: ReportContent) -> Table:
     """Returns a row per method: episodes, success, the main metric, and the most frequent failure."""
-    main = next((item for item in content.description.metrics if item.name != SUCCESS), None)
+    main = _main_metric(content)
     found = {(item.metric, item.method): item for item in content.analysis.summaries}
     success = next(metric for metric in content.metrics if metric.name == SUCCESS)
     rows = []
@@ -256,18 +281,19 @@ def shown_text(comparisons: Sequence[Comparison]) -> str:
 
 def method_table(content: ReportContent, component: str) -> Table:
     """Returns the figures of each method for the metrics of a component."""
-    rows = []
-    for metric in content.metrics:
-        if metric.component != component:
-            continue
-        for item in content.analysis.summaries:
-            if item.metric == metric.name:
-                rows.append(_method_row(metric, item))
+    metrics = [metric for metric in content.metrics if metric.component == component]
+    rows = [
+        _method_row(metric, item)
+        for metric in metrics
+        for item in content.analysis.summaries
+        if item.metric == metric.name
+    ]
     columns = (
         "metric", "method", "rate or median (interval)", "quartiles", "mean", "counted", "units", "at the limit",
         "missing",
     )  # fmt: skip
-    return Table(f"methods_{component}", f"Methods by the metrics of {words(component)}.", columns, tuple(rows))
+    caption = f"Methods by the metrics of {words(component)}."
+    return Table(f"methods_{component}", caption, columns, tuple(rows), tuple(_needed_episodes(content, metrics)))
 
 
 def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:

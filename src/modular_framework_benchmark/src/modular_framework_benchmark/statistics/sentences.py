@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_benchmark.statistics.comparison import EpisodeCounts, Estimate, Interval, PairCounts, PairFigures
@@ -114,8 +114,6 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     scale = 100.0 if metric.is_fraction else 1.0
     unit = " %" if metric.is_fraction else f" {metric.unit}".rstrip()
     interval, interval_text = estimate.interval, "no interval"
-    if estimate.needed_episodes is not None:
-        interval_text += f", which would need about {estimate.needed_episodes} episodes"
     digits = _digits(0.0, scale * estimate.value)
     if interval is not None:
         digits = _digits(scale * interval.low, scale * interval.high)
@@ -126,6 +124,18 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
         f"{method}:{prefix} {spaced_name(metric)} {_number(scale * estimate.value, digits)}{unit} ({interval_text}, "
         f"{count(counts.counted, 'episode')}{_remarks(counts)})"
     )
+
+
+def needed_episodes(metric: Metric, mean: str, episodes: Mapping[str, int]) -> str:
+    """Returns the sentence with the numbers of episodes that a mean needs for an interval.
+
+    Args:
+        metric: Metric of the mean.
+        mean: Name of the mean.
+        episodes: Number of episodes by method.
+    """
+    needed = enumeration([f"{count(number, 'episode')} of {method}" for method, number in episodes.items()])
+    return f"For an interval, the {mean} of the {spaced_name(metric)} needs about {needed}."
 
 
 def spaced_name(metric: Metric) -> str:
