@@ -7,11 +7,13 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from modular_framework_testing.ros_session import RosSession
 
+ORIGINAL_CONFIGURATION = Path(__file__).resolve().parents[1] / "original_configuration"
 TASK_TIMEOUT_S = 180.0
 LIFTED_M = 0.10
 
@@ -73,6 +75,18 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
     lifted = {name: last - first for name, (first, last) in heights.items()}
     assert ended and max(lifted.values()) > LIFTED_M, f"{lifted}\n{launch.log()}"
     assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted
+
+
+def test_a_configuration_folder_of_the_original_picks_with_a_planner_that_is_there(session: RosSession) -> None:
+    launch = session.run_framework(
+        gui="false", rviz="false", config_directory=str(ORIGINAL_CONFIGURATION), planner_name="RRTConnect"
+    )
+    assert launch.wait(TASK_TIMEOUT_S) == 0, launch.log()
+    assert "Task 'simulation_pick' ended with outcome 'successful_pipeline': SUCCEEDED" in launch.log()
+    assert (
+        "parameter '/top_down_grasp_generator/gripper_joint' is not set: joint 'ezgripper_knuckle_palm_L1_1' moves the "
+        "fingers, the only driven joint of the planning group 'ezgripper'"
+    ) in launch.log()
 
 
 def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None:

@@ -20,10 +20,12 @@ from modular_framework_core.grasp_generation.convex_bodies import MESH_TOLERANCE
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
+    driven_joint,
     measure_gripper,
 )
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+import two_finger_hands  # noqa: E402
 from linkage_hands import four_bar_hand, joint, limit, link, mimic  # noqa: E402
 
 TOLERANCE_M = 1.0e-3
@@ -119,3 +121,15 @@ def test_the_body_around_a_rounded_mesh_has_few_faces_and_is_hardly_larger(size:
     exact = trimesh.convex.convex_hull(points)
     heights = np.einsum("cfi,fi->cf", corners[:, None] - exact.triangles_center, exact.face_normals)
     assert heights.max() < MESH_TOLERANCE_M, "above a face of the exact hull"
+
+
+SRDF = '<robot name="jaws"><group name="hand"><joint name="slide_2"/><joint name="slide"/></group></robot>'
+
+
+def test_the_driven_joint_of_a_hand_is_the_only_one_that_mimics_no_other() -> None:
+    assert driven_joint(two_finger_hands.jaws(), SRDF, "hand") == "slide"
+    both_driven = two_finger_hands.jaws().replace('<mimic joint="slide"/>', "")
+    with pytest.raises(GripperGeometryError, match=r"group 'hand' has 2 driven joints \(slide_2, slide\)"):
+        driven_joint(both_driven, SRDF, "hand")
+    with pytest.raises(GripperGeometryError, match="the gripper's joint is not known: .*'grip'"):
+        driven_joint(two_finger_hands.jaws(), SRDF, "grip")

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from modular_framework_core.commander.robot_groups import RobotModelError, read_group
 from modular_framework_core.grasp_generation.convex_bodies import (
     ConvexBody,
     ShapeError,
@@ -139,6 +140,27 @@ class GripperGeometry:
                 fronts = column_fronts(part.planes[samples], near[:, :2], margin)
                 heights = np.maximum(heights, (fronts + near[:, 2]).max(axis=1))
         return heights
+
+
+def driven_joint(urdf: str, srdf: str, hand: str) -> str:
+    """Returns the only driven joint of a hand.
+
+    Args:
+        urdf: Text of the robot description.
+        srdf: Text of the semantic description.
+        hand: Planning group of the hand.
+
+    Raises:
+        GripperGeometryError: The group does not exist, or has several driven joints or none.
+    """
+    try:
+        joints = read_group(urdf, srdf, hand).joint_names
+    except RobotModelError as error:
+        raise GripperGeometryError(f"the gripper's joint is not known: {error}") from error
+    if len(joints) != 1:
+        found = f"{len(joints)} driven joints ({', '.join(joints)})" if joints else "no driven joint"
+        raise GripperGeometryError(f"the gripper's joint is not known: the planning group '{hand}' has {found}")
+    return joints[0]
 
 
 def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+import rospy
+
 from modular_framework_core.grasp_generation.grasp_candidates import ReadNumber
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, driven_joint
 from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
 from modular_framework_core.grasp_generation.hand_poses import HandSettings
 from modular_framework_core.grasp_generation.pair_grasps import PairGraspSettings
@@ -21,7 +24,7 @@ class GeneratorSettings:
         frame: Frame of the crop box and of the grasps (``origin_frame_name``).
         crop: Search volume for objects (``min_x_crop`` ... ``max_z_crop``).
         arm_group: Planning group whose tip is the grasp frame (``arm_group_name``).
-        gripper_joint: Actuated joint of the gripper (``~gripper_joint``, required).
+        gripper_joint: Actuated joint of the gripper; empty for the only driven joint of the hand (``~gripper_joint``).
         object_name: Object to grasp; empty for all objects in the crop box (``~object_name``).
         name_prefix: Prefix of the grasp names <prefix>1, <prefix>2, ...; empty for anonymous grasps (``~name_prefix``).
         hand_id: Hand id of the grasps (``manipulator_group_name``).
@@ -72,6 +75,27 @@ def read_settings() -> GeneratorSettings:
         scene_timeout_s=read("~scene_timeout"),
         seed=read("/seed"),
     )
+
+
+def find_gripper_joint(settings: GeneratorSettings) -> str:
+    """Returns the actuated joint of the gripper: the parameter, or else the only driven joint of the hand, with a log.
+
+    Raises:
+        GripperGeometryError: The parameter is not set, and the hand has several driven joints or none.
+    """
+    if settings.gripper_joint:
+        return settings.gripper_joint
+    parameter = rospy.resolve_name("~gripper_joint")
+    descriptions = (str(rospy.get_param(f"robot_description{end}")) for end in ("", "_semantic"))
+    try:
+        joint = driven_joint(*descriptions, settings.hand_id)
+    except GripperGeometryError as error:
+        raise GripperGeometryError(f"parameter '{parameter}' is not set, and {error}; set the parameter") from error
+    rospy.loginfo(
+        "parameter '%s' is not set: joint '%s' moves the fingers, the only driven joint of the planning group '%s'",
+        parameter, joint, settings.hand_id,
+    )  # fmt: skip
+    return joint
 
 
 def read_hand_motion(read: ReadNumber) -> HandMotionSettings:

@@ -26,7 +26,11 @@ from modular_framework_core.grasp_generation.grasp_candidates import (
 )
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
-from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
+from modular_framework_core.grasp_generation.ros_generator_settings import (
+    GeneratorSettings,
+    find_gripper_joint,
+    read_settings,
+)
 from modular_framework_core.grasp_generation.ros_grasp_reachability import Reach, check_reach
 from modular_framework_core.grasp_generation.ros_scene_objects import NoGraspError, NoObjectError, SceneObjects
 from modular_framework_core.grasp_generation.ros_stored_grasps import StoredGrasps
@@ -115,7 +119,9 @@ class GraspGenerator:
             self._scene.connect(start_timeout())
             self._stored.connect(start_timeout())
             tip = self._commander.group.tip_link
-            self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
+            self._gripper = measure_gripper(
+                str(rospy.get_param("robot_description")), tip, find_gripper_joint(settings)
+            )
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
         if isinstance(self._method, SeeingMethod):
