@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -88,6 +89,20 @@ def test_the_experiments_that_the_cases_change_are_in_order(content: dict, tmp_p
 )
 def test_names_that_something_answers_to_are_taken(path: tuple[str, ...], value: object, tmp_path: Path) -> None:
     assert experiment_faults(changed(PLAIN, path, value), tmp_path) == ""
+
+
+def test_a_misspelt_parameter_of_a_pipeline_in_a_configuration_package_is_refused() -> None:
+    path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
+    launch = preview_launch(path, [])
+
+    def faults(name: str) -> list[str]:
+        changed_launch = replace(launch, parameters={**launch.parameters, f"{PIPELINE}/{name}": 0.5})
+        return [fault.text for fault in LaunchCheck(changed_launch).faults()]
+
+    assert faults("jigle_fraction") == [
+        "pipeline 'ompl' has no parameter 'jigle_fraction'; did you mean 'jiggle_fraction'?"
+    ]
+    assert faults("my_planner/weight") == []
 
 
 def test_a_parameter_of_a_node_of_ones_own_is_taken_when_it_is_listed(tmp_path: Path) -> None:

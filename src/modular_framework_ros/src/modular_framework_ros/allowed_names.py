@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 MAX_NAME_LENGTH = 100
 """Longer names get no suggestion, which would take a time that grows with the square of their length."""
+MISSPELLING_RATIO = 0.85
+"""Similarity of a misspelling: a wrong, missing or additional letter in a word of seven letters."""
 
 
 def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
@@ -26,6 +28,11 @@ def closest(found: str, allowed: Iterable[str]) -> str | None:
     if not matches and len(wanted) >= 3:
         matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
     return by_lower[matches[0]] if matches else None
+
+
+def misspelling(found: str, name: str) -> bool:
+    """Returns whether a text is probably a misspelling of a name, so that the text is no name of something else."""
+    return bool(difflib.get_close_matches(found.lower(), [name.lower()], cutoff=MISSPELLING_RATIO))
 
 
 def nearest(found: str, allowed: Iterable[str]) -> str:

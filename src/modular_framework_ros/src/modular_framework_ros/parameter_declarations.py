@@ -136,8 +136,8 @@ class NodeDeclaration:
 
     Attributes:
         parameters: Declarations by the name in the file.
-        closed: Whether an undeclared private parameter is an error. False
-            for nodes that read the parameters of other configuration packages.
+        closed: Whether an undeclared private parameter is an error. False for nodes with plugins whose parameters are
+            not declared; there, only a name that differs slightly from a declared name is an error.
     """
 
     parameters: Mapping[str, Declaration] = field(default_factory=dict)

@@ -114,8 +114,11 @@ class LaunchCheck:
         names = PipelineNames(
             parent, (*self._pipelines, *sorted(there - {*self._pipelines})), self._robot.groups, registry
         )
-        for name, value in leaves(self._given).items():
+        settings = leaves(self._given)
+        for name, value in settings.items():
             yield from names.faults(name, value)
+        for name in self.launch.parameters:
+            yield from names.misspelt(name) if name not in settings else ()
 
     @property
     def _robot(self) -> RobotNames:

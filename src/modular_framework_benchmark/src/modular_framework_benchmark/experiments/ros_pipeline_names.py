@@ -9,7 +9,7 @@ from typing import Any
 
 from modular_framework_core.launching.ros_declared_names import LaunchFault
 from modular_framework_planning.planning_pipeline.planner_registry import PlannerRegistry, UnknownNameError
-from modular_framework_ros.allowed_names import listing, nearest
+from modular_framework_ros.allowed_names import listing, misspelling, nearest
 from modular_framework_ros.declared_trees import tree_fault
 from modular_framework_ros.parameter_declarations import existing_declaration
 
@@ -59,6 +59,15 @@ class PipelineNames:
                 yield LaunchFault(name, f"parameter '{name}' {text}")
         elif key in declared and not rest[1:] and declared[key].fault(value):
             yield LaunchFault(name, f"parameter '{name}' {declared[key].fault(value)}")
+
+    def misspelt(self, name: str) -> Iterator[LaunchFault]:
+        """Yields a fault if a key differs slightly from a known key; other keys may belong to planners of users."""
+        if name.startswith(self.parent):
+            pipeline, _, key = name.removeprefix(self.parent).partition("/")
+            key = key.partition("/")[0]
+            known = (*existing_declaration(PACKAGE, "planning_pipeline").parameters, *self.groups)
+            if key not in known and any(misspelling(key, item) for item in known):
+                yield LaunchFault(name, f"pipeline '{pipeline}' has no parameter '{key}'{nearest(key, known)}")
 
     def _planner_faults(self, name: str, value: Any, pipeline: str, group: str) -> Iterator[LaunchFault]:
         """Yields the planners in a value that the pipeline does not have."""

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
-from modular_framework_ros.allowed_names import closest, nearest
+from modular_framework_ros.allowed_names import closest, misspelling, nearest
 from modular_framework_ros.declared_trees import tree_fault
 from modular_framework_ros.parameter_declarations import (
     Declaration,
@@ -19,6 +19,10 @@ from modular_framework_ros.parameter_declarations import (
 )
 
 ROSLAUNCH_NAMES = ("/rosdistro", "/rosversion", "/run_id", "/roslaunch")
+HARDWARE = ("modular_framework_control", "hardware")
+"""Declaration of the common parameters of all hardware."""
+MAX_NAME_PARTS = 10
+"""Maximum number of parts of a declared name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +55,12 @@ class DeclaredNames:
         self.known: dict[str, list[tuple[LaunchedNode, Declaration]]] = {}
         self._undeclared_nodes: list[str] = []
         self._closed_nodes: list[str] = []
+        self._open_nodes: list[str] = []
         for node, declared in self._declarations():
             if declared is None:
                 self._undeclared_nodes.append(f"{node.name}/")
                 continue
-            if declared.closed:
-                self._closed_nodes.append(f"{node.name}/")
+            (self._closed_nodes if declared.closed else self._open_nodes).append(f"{node.name}/")
             for item in declared.parameters.values():
                 self.known.setdefault(_resolved_name(item.name, node), []).append((node, item))
         self._trees = [f"{name}/" for name, users in self.known.items() if any(item.tree for _, item in users)]
@@ -66,11 +70,18 @@ class DeclaredNames:
         for node in self._launch.nodes:
             declared = node_declaration(node.package, node.executable)
             yield node, declared
-            for part in self._hardware_of(node, declared):
-                package, _, kind = str(self._launch.parameters.get(f"{part}/type", "")).partition("/")
-                hardware = node_declaration(package, kind) if kind else None
-                if hardware is not None:
-                    yield replace(node, name=part), hardware
+            yield from self._hardware_declarations(node, declared) if declared else ()
+
+    def _hardware_declarations(
+        self, node: LaunchedNode, declared: NodeDeclaration
+    ) -> Iterator[tuple[LaunchedNode, NodeDeclaration]]:
+        """Yields the hardware of a node; hardware without a declaration may read any further parameter."""
+        types = {part: self._launch.parameters.get(f"{part}/type", "") for part in self._hardware_of(node, declared)}
+        default = [item.default for item in declared.parameters.values() if item.names == "hardware" and item.default]
+        for part, kind in (types or dict.fromkeys([node.name], *default) if default else types).items():
+            package, _, name = str(kind).partition("/")
+            own = node_declaration(package, name) if name else None
+            yield replace(node, name=part), own or replace(existing_declaration(*HARDWARE), closed=False)
 
     def _hardware_of(self, node: LaunchedNode, declared: NodeDeclaration | None) -> Iterator[str]:
         """Yields the namespace of each hardware of a node."""
@@ -115,12 +126,44 @@ class DeclaredNames:
                         yield LaunchFault(name, f"parameter '{name}' {fault}")
 
     def misspelt(self, without: Container[str] = ()) -> Iterator[LaunchFault]:
-        """Yields a fault for each private parameter that its node does not read, except for names in ``without``."""
+        """Yields a fault for each misspelt parameter, except for names in ``without``.
+
+        A private parameter of a closed node is misspelt if the node does not read it. Other names may belong to plugins
+        and foreign programs. They are misspelt if they differ slightly from a declared name of the same namespace.
+        """
+        namespaces = sorted({node.namespace for node in self._launch.nodes}, key=len, reverse=True)
         for name in self._launch.parameters:
-            is_read = name in self.known or name.startswith(tuple(self._trees))
-            if name.startswith(tuple(self._closed_nodes)) and not is_read and name not in without:
+            if name in without or name in self.known or name.startswith((*self._trees, *self._undeclared_nodes)):
+                continue
+            open_node = next((node for node in self._open_nodes if name.startswith(node)), "")
+            if not open_node and name.startswith(tuple(self._closed_nodes)):
                 node = name.rpartition("/")[0]
                 yield LaunchFault(name, f"node '{node}' does not read the parameter '{name}'{self._hint(name)}")
+                continue
+            parent = open_node or next((namespace for namespace in namespaces if name.startswith(namespace)), "/")
+            meant = self._meant(name, parent, max_parts=MAX_NAME_PARTS if open_node else 1)
+            if meant:
+                yield LaunchFault(name, f"no node reads the parameter '{name}'; did you mean '{meant}'?")
+
+    def _meant(self, name: str, parent: str, max_parts: int) -> str:
+        """Returns the declared name that differs from a name slightly and in one part only, or "".
+
+        Args:
+            name: Resolved name.
+            parent: Node or namespace that contains the declared name, with a slash at the end.
+            max_parts: Maximum number of parts of the declared name below the parent.
+        """
+        parts = name.removeprefix(parent).split("/")
+        for known in (*self.known, *self._trees):
+            declared = known.removeprefix(parent).rstrip("/").split("/")
+            rest = parts[len(declared) :]
+            is_comparable = len(declared) <= min(len(parts), max_parts) and (not rest or known.endswith("/"))
+            if not known.startswith(parent) or not is_comparable:
+                continue
+            differing = [(part, other) for part, other in zip(parts, declared, strict=False) if part != other]
+            if len(differing) == 1 and misspelling(*differing[0]):
+                return parent + "/".join([*declared, *rest])
+        return ""
 
     def wrong_values(self) -> Iterator[LaunchFault]:
         """Yields a fault for each value that a node does not accept and each missing required parameter."""

@@ -536,6 +536,7 @@ CASES = [
     in_config(
         "motion_planner_config.yaml", "arm_group_name", "arm_and_manipulatr", "did you mean 'arm_and_manipulator'"
     ),
+    in_config("motion_planner_config.yaml", "planner_nme", "PRM", "did you mean '/planner_name'"),
     in_config("generative_methods_config.yaml", "top_down_grasp_generator/yaw_stp", 0.2, "did you mean.*yaw_step'"),
     in_config("generative_methods_config.yaml", "top_down_grasp_generator/max_checks", "all", "is 'all'; allowed"),
     in_config(
@@ -555,6 +556,7 @@ CASES = [
     in_hardware("UrArmRobotHW", "UrArmRobotHw", "did you mean 'modular_framework_drivers/UrArmRobotHW'"),
     in_hardware("modular_framework_drivers/EzG", "modular_framework_driver/EzG", "framework_drivers/EzGripperRobotHW'"),
     in_hardware("[ur_robot_hw,", "[ur_robot_h,", "no parameter '/ur_robot_h/type'.*did you mean 'ur_robot_hw'"),
+    in_hardware("robot_hardware: [", "robot_hardwares: [", "did you mean '/robot_hardware'"),
     in_hardware("robot_ip_address", "robot_ip_adress", "did you mean '/ur_robot_hw/robot_ip_address'"),
     in_controllers(
         "position_controllers/JointTrajectoryController",
