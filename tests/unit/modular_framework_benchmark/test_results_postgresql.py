@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from postgresql_server import Server, require_server, running_server
+from postgresql_server import Server, running_server
 from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError
 
-require_server()
 EPISODES = sample_episodes(3)
 
 

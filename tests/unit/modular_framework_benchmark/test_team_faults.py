@@ -13,7 +13,7 @@ import distributed
 import pytest
 from dask_cluster import LosingRunner, running_cluster, wait_until_none
 from experiment_texts import PICK, read
-from postgresql_server import Network, require_server, running_server
+from postgresql_server import Network, running_server
 from sqlalchemy import create_engine, text
 
 from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
@@ -24,7 +24,6 @@ from modular_framework_benchmark.scheduling.dask_pool import DaskPool
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun
 from modular_framework_benchmark.scheduling.progress import Progress
 
-require_server()
 EXPERIMENT = PICK.replace("planner: [RRTConnect, PRM]", "planner: [RRTConnect]")
 MOST_RUNS = 12
 
