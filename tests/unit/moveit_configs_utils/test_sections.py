@@ -137,9 +137,7 @@ def test_sensors_are_listed_in_either_form(make_package: PackageMaker, text: str
 
 def test_faulty_sensors_and_missing_files_of_them_are_named(make_package: PackageMaker) -> None:
     make_package({"config/sensors_3d.yaml": "sensors: [kinect]\n", "config/other.yaml": "sensors: {a: 1}\n"})
-    with pytest.raises(
-        ParameterFileError, match="sensors_3d.yaml: sensors lists kinect; add a mapping of that name"
-    ):
+    with pytest.raises(ParameterFileError, match="sensors_3d.yaml: sensors lists kinect; add a mapping of that name"):
         MoveItConfigsBuilder("r").to_moveit_configs()
     with pytest.raises(ParameterFileError, match="other.yaml: sensors is {'a': 1}; expected a list"):
         MoveItConfigsBuilder("r").sensors_3d("config/other.yaml")
