@@ -4,51 +4,92 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+import statistics
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+TITLES = ("fault", "first named by", "text", "after [s]: median, worst", "goal under way", "back after [s]")
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRow:
-    """One fault; None where there is no such figure.
+    """Result of one fault; None where there is no figure, "" where there is nothing to report.
 
     Attributes:
-        name: of the fault.
-        text: what the user reads.
-        reported_s: median time until it was reported [s].
-        reported_max_s: longest [s].
-        back_s: median time from its end until the device was usable again [s].
-        moved: how far a joint moved after the fault [rad].
+        name: Fault.
+        channel: ROS interface that named the cause first.
+        text: Text that named the cause.
+        goal: End of the goal that ran during the fault.
+        named_s: Time until the cause was named, median of the repetitions [s].
+        named_max_s: Longest time until the cause was named [s].
+        back_s: Time from the end of the fault until the device is usable again, median [s].
+        moved: Maximum joint motion after the fault [rad].
+        right: Whether the row meets all requirements.
     """
 
     name: str
-    text: str
-    reported_s: float | None
-    reported_max_s: float | None
-    back_s: float | None
-    moved: float | None
+    channel: str = ""
+    text: str = ""
+    goal: str = ""
+    named_s: float | None = None
+    named_max_s: float | None = None
+    back_s: float | None = None
+    moved: float | None = None
+    right: bool = False
+
+
+def summary(rows: Sequence[FaultRow]) -> FaultRow:
+    """Combines the repetitions of a fault; the text is that of the first wrong repetition, if any."""
+
+    def known(values: Iterable[float | None]) -> list[float]:
+        return [value for value in values if value is not None]
+
+    named_s, back_s = known(row.named_s for row in rows), known(row.back_s for row in rows)
+    return replace(
+        next((row for row in rows if not row.right), rows[0]),
+        named_s=statistics.median(named_s) if named_s else None,
+        named_max_s=max(named_s, default=None),
+        back_s=statistics.median(back_s) if back_s else None,
+        moved=max(known(row.moved for row in rows), default=None),
+        right=all(row.right for row in rows),
+    )
+
+
+def printed(row: FaultRow) -> str:
+    """Returns a row as one line for the terminal."""
+    figures = "  ".join(
+        f"{title} {'      -' if value is None else f'{value:7.3f}'}"
+        for title, value in (
+            ("named", row.named_s),
+            ("max", row.named_max_s),
+            ("back", row.back_s),
+            ("moved", row.moved),
+        )
+    )
+    end = f" | goal: {row.goal}" if row.goal else ""
+    return f"{'ok ' if row.right else 'NOT'} {row.name:52} {figures}  {row.channel or '-'}: {row.text}{end}"
 
 
 def fault_table(rows: Iterable[FaultRow], moved_title: str) -> str:
-    """The rows as a table in Markdown.
+    """Returns the rows as a table in Markdown.
 
     Args:
-        rows: the faults.
-        moved_title: what `moved` is.
+        rows: Faults.
+        moved_title: Title of the column `moved`.
     """
 
     def number(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}f}"
 
-    lines = [
-        f"| fault | what the user reads | reported after [s]: median, worst | back after [s] | {moved_title} [rad] |",
-        "|---|---|---|---|---|",
-    ]
+    titles = (*TITLES, f"{moved_title} [rad]")
+    lines = [f"| {' | '.join(titles)} |", "|" + "---|" * len(titles)]
     for row in rows:
-        reported = ", ".join(filter(None, (number(row.reported_s, 3), number(row.reported_max_s, 3))))
+        named = ", ".join(filter(None, (number(row.named_s, 3), number(row.named_max_s, 3))))
         text = re.sub(r"127\.\d+\.\d+\.\d+", "ADDRESS", row.text).removeprefix("hardware fault: ")
-        lines.append(f"| {row.name} | {text} | {reported} | {number(row.back_s, 2)} | {number(row.moved, 3)} |")
+        text = re.sub(r"(joint '[^']+': [^;]+)(; joint '[^']+': [^;]+)+", r"\1; ...", text)  # one joint is enough
+        cells = (row.name, row.channel, text, named, row.goal, number(row.back_s, 2), number(row.moved, 3))
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 
