@@ -98,6 +98,14 @@ def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: 
     assert handle(loop).command == 0.8
 
 
+def test_a_gripper_leaves_an_object_at_once_however_far_beyond_the_object_its_command_was(loop: Any) -> None:
+    send(loop, 0.95)
+    loop.run(2.0)
+    goal_handle = send(loop, 0.4)
+    loop.run(0.15)  # 0.1 rad at 1 rad/s; the way back from 0.95 to the object takes longer than the stall timeout
+    assert goal_handle.status is GoalStatus.SUCCEEDED, goal_handle.text
+
+
 def test_a_stall_is_not_seen_before_the_timeout_has_passed_since_the_goal(loop: Any) -> None:
     send(loop, 0.8)
     loop.run(2.0)

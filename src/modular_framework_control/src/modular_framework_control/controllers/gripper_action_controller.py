@@ -195,6 +195,8 @@ class GripperActionController(Controller):
                 goal.goal_handle.finish(GoalStatus.REJECTED, self._state(False, False), text)
 
     def update(self, time_s: float, period_s: float) -> None:
+        if self._active is not None:
+            self._command = self._active.position
         self._mailbox.process(lambda goal: self._process(goal, time_s))
         missing = unmeasured([self._handle])
         if missing and self._active is not None:
@@ -236,7 +238,12 @@ class GripperActionController(Controller):
     def _accept(self, goal: _Goal, time_s: float) -> None:
         self._finish(GoalStatus.CANCELED, self._state(False, False), "preempted by a new goal")
         self._active = goal
-        self._command = goal.position
+        position = self._handle.position
+        if (self._command - position) * (goal.position - position) < 0.0:
+            # The velocity limit counts from the last command, which is beyond the object that the fingers held.
+            self._hold()
+        else:
+            self._command = goal.position
         self._max_effort = goal.max_effort if goal.max_effort > 0.0 else self._default_max_effort
         self._rest_position = self._handle.position
         self._rest_since_s = time_s
