@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from geometry_msgs.msg import Point, Pose, Quaternion
 
 from modular_framework_states.grasp_goals import GraspGoalError
 from modular_framework_states.states import release
@@ -16,7 +17,8 @@ from modular_framework_states.states.release import Release
 @pytest.fixture
 def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A hand that holds a can, in a scene that detaches it on request, or by itself after some reads."""
-    state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="")
+    state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="", time_s=0.0)
+    state.falls_until_s = 0.0
 
     def send(client: Any, stage: str, grasp: Any, **_: Any) -> None:
         state.sent.append((stage, grasp))
@@ -29,7 +31,16 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
         state.reads_left -= 1
         return dict(state.held)
 
-    monkeypatch.setattr(release, "rospy", SimpleNamespace(get_param=lambda *_: state.simulation))
+    def object_poses(names: list[str]) -> dict[str, Pose]:
+        state.time_s += 0.1
+        return {
+            name: Pose(Point(0.0, 0.0, -min(state.time_s, state.falls_until_s)), Quaternion(w=1.0)) for name in names
+        }
+
+    clock = SimpleNamespace(get_param=lambda *_: state.simulation, get_time=lambda: state.time_s)
+    monkeypatch.setattr(release, "rospy", clock)
+    monkeypatch.setattr(release, "SimulatedTime", lambda: SimpleNamespace(enabled=False))
+    monkeypatch.setattr(release, "object_poses", object_poses)
     monkeypatch.setattr(release, "posture_positions", lambda posture: {"f": 0.0})
     monkeypatch.setattr(release, "posture_grasp", lambda positions, torque: dict(positions))
     monkeypatch.setattr(release, "send", send)
@@ -38,8 +49,8 @@ def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
     return state
 
 
-def run(timeout: float = 5.0) -> tuple[str, str]:
-    state = Release(timeout=timeout)
+def run(timeout: float = 5.0, rest_time: float = 0.0) -> tuple[str, str]:
+    state = Release(timeout=timeout, rest_time=rest_time)
     outcome = state.execute(SimpleNamespace(manipulator_controller_client=None, max_torque=1.0))
     return outcome, state.reason
 
@@ -61,3 +72,25 @@ def test_what_stays_between_the_fingers_and_fingers_that_do_not_open_are_failure
     hand.problem = "joint 'f' is 0.4 away from its target"
     outcome, reason = run()
     assert outcome == "fail" and "joint 'f' is 0.4 away" in reason
+
+
+def test_held_time_passes_until_the_simulation_has_noticed_that_the_fingers_left_the_object(
+    hand: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hand.simulation, hand.reads_left = True, 10**6
+
+    def sleep(duration_s: float) -> None:
+        hand.time_s += duration_s
+        hand.reads_left = 0 if hand.time_s > 0.3 else hand.reads_left
+
+    monkeypatch.setattr(release, "SimulatedTime", lambda: SimpleNamespace(enabled=True, sleep=sleep))
+    assert run() == ("success", "")
+
+
+def test_a_released_object_must_come_to_rest_if_a_rest_time_is_given(hand: Any) -> None:
+    hand.falls_until_s = 0.4
+    assert run(rest_time=0.5) == ("success", "")
+    assert hand.time_s == pytest.approx(0.4 + 0.5, abs=0.11)
+    hand.falls_until_s, hand.held = 1000.0, {"can__link": "palm"}
+    outcome, reason = run(timeout=0.3, rest_time=0.5)
+    assert outcome == "fail" and "released can__link, but the planning scene does not show it at rest" in reason

@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+
+import numpy as np
 import rospy
+from geometry_msgs.msg import Pose
 from moveit_msgs.msg import (
     AttachedCollisionObject,
     CollisionObject,
@@ -22,6 +26,8 @@ from modular_framework_ros.calls import CallError, request_service
 
 PREFIX_PARAMETER = "manipulator_prefix"
 SERVICE_TIMEOUT_S = 10.0
+REST_M, REST_RAD = 1.0e-3, 0.01
+"""Largest motion of an object at rest."""
 
 
 def held_objects() -> dict[str, str]:
@@ -41,6 +47,36 @@ def held_objects() -> dict[str, str]:
         for item in scene.robot_state.attached_collision_objects
         if not prefix or manipulator_links([item.link_name], prefix)
     }
+
+
+def object_poses(names: Collection[str]) -> dict[str, Pose]:
+    """Returns the poses of world objects in the planning scene, {object: pose in the planning frame}.
+
+    Raises:
+        CallError: move_group does not respond, or has no such object.
+    """
+    components = PlanningSceneComponents(components=PlanningSceneComponents.WORLD_OBJECT_NAMES)
+    request = GetPlanningSceneRequest(components=components)
+    scene = request_service("get_planning_scene", GetPlanningScene, request, SERVICE_TIMEOUT_S).scene
+    poses = {item.id: item.pose for item in scene.world.collision_objects if item.id in names}
+    if missing := sorted(set(names) - poses.keys()):
+        raise CallError(f"the planning scene has no {', '.join(missing)} in the world")
+    return poses
+
+
+def moved(before: Mapping[str, Pose], after: Mapping[str, Pose]) -> bool:
+    """Returns whether an object has moved by more than REST_M or turned by more than REST_RAD."""
+    for name, pose in before.items():
+        (start, turn), (end, turned) = (_arrays(item) for item in (pose, after[name]))
+        if np.linalg.norm(end - start) > REST_M or 2.0 * np.arccos(min(abs(turn @ turned), 1.0)) > REST_RAD:
+            return True
+    return False
+
+
+def _arrays(pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+    """Returns position (3,) [m] and quaternion (4,)."""
+    position, turn = pose.position, pose.orientation
+    return np.array([position.x, position.y, position.z]), np.array([turn.x, turn.y, turn.z, turn.w])
 
 
 def detach(objects: dict[str, str]) -> None:

@@ -10,11 +10,12 @@ import rospy
 from modular_framework_core.commander.robot_groups import RobotModelError
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_core.state_api.option_limits import Positive
+from modular_framework_core.state_api.option_limits import NotNegative, Positive
 from modular_framework_core.state_api.option_uses import Named
-from modular_framework_ros.calls import CallError, wait_until
+from modular_framework_ros.calls import CallError
+from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.grasp_goals import GraspGoalError, send
-from modular_framework_states.held_objects import detach, held_objects
+from modular_framework_states.held_objects import detach, held_objects, moved, object_poses
 from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
 
 SIMULATION_PARAMETER = "simulation"
@@ -25,27 +26,35 @@ class Release(FrameworkState):
     """Opens the manipulator wide; positive once the fingers are open and no object is attached to them.
 
     The simulation detaches an object in the planning scene when the fingers have left it, and the state waits for that.
-    Without a simulation, the state detaches the object.
+    Without a simulation, the state detaches the object. With a rest time, the released objects must also come to rest.
 
     Args:
         posture: Name of the widest posture, a state of the manipulator's planning group.
-        timeout: Maximum wait for the end of the motion, and then for the simulation to detach the object [s].
+        timeout: Maximum wait for the end of the motion, then for the simulation to detach the object, and then for the
+            object to come to rest [s].
+        rest_time: Time for which the planning scene must show the released objects at rest [s]; 0 for no check.
         **keys: Outcomes and userdata keys of any state.
     """
 
     DEFAULT_IO_KEYS = ("manipulator_controller_client", "max_torque")
 
     def __init__(
-        self, posture: Annotated[str, Named("posture")] = "open", timeout: Positive = 30.0, **keys: Unpack[StateKeys]
+        self,
+        posture: Annotated[str, Named("posture")] = "open",
+        timeout: Positive = 30.0,
+        rest_time: NotNegative = 0.0,
+        **keys: Unpack[StateKeys],
     ) -> None:
         super().__init__(**keys)
-        self._posture, self._timeout_s = posture, float(timeout)
+        self._posture, self._timeout_s, self._rest_s = posture, float(timeout), float(rest_time)
+        self._time = SimulatedTime()
 
     def execute(self, userdata: Any) -> str:
         """Opens the fingers and detaches the held objects."""
         try:
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
             client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
+            released = list(held_objects()) if self._rest_s else []
             send(
                 client,
                 "pregrasp",
@@ -55,12 +64,13 @@ class Release(FrameworkState):
                 stop_requested=self.preempt_requested,
             )
             if rospy.get_param(SIMULATION_PARAMETER, False):
-                wait_until(lambda: self.preempt_requested() or not held_objects(), self._timeout_s, SCENE_PERIOD_S)
+                self.wait_until(self._nothing_held, self._timeout_s, SCENE_PERIOD_S)
             elif held := held_objects():
                 detach(held)
             if self.preempt_requested():
                 return self.stopped()
             remaining = held_objects()
+            rests = bool(remaining) or self._rest(released)
         except (RobotModelError, GraspGoalError, CallError) as error:
             return self.fail(f"release by the posture '{self._posture}': {error}")
         if remaining:
@@ -69,4 +79,36 @@ class Release(FrameworkState):
                 f"{', '.join(remaining)} attached to {', '.join(sorted(set(remaining.values())))} after "
                 f"{self._timeout_s:g} s; check why the fingers still hold it"
             )
+        if not rests:
+            return self.fail(
+                f"the fingers released {', '.join(released)}, but the planning scene does not show it at rest for "
+                f"{self._rest_s:g} s within {self._timeout_s:g} s"
+            )
         return self.succeed()
+
+    def _pass_time(self) -> None:
+        """Lets held simulated time pass, in which the simulation notices a release and the object comes to rest."""
+        if self._time.enabled:
+            self._time.sleep(SCENE_PERIOD_S)
+
+    def _nothing_held(self) -> bool:
+        if not held_objects():
+            return True
+        self._pass_time()
+        return False
+
+    def _rest(self, objects: list[str]) -> bool:
+        """Waits until objects are at rest for the rest time; returns whether they are."""
+        if not objects:
+            return True
+        poses, since_s = object_poses(objects), rospy.get_time()
+
+        def at_rest() -> bool:
+            nonlocal poses, since_s
+            self._pass_time()
+            current = object_poses(objects)
+            if moved(poses, current):
+                poses, since_s = current, rospy.get_time()
+            return rospy.get_time() - since_s >= self._rest_s
+
+        return self.wait_until(at_rest, self._timeout_s, SCENE_PERIOD_S)
