@@ -35,6 +35,17 @@ def test_every_combination_has_the_settings_of_the_base_and_of_its_levels(tmp_pa
     assert settings.launch == "modular_framework_api/start_framework.launch"
 
 
+def test_another_launch_file_replaces_that_of_the_file(tmp_path: Path) -> None:
+    known = {"task": {name: entry.metric for name, entry in METRICS.items()}}
+    resources, path = FakeResources(tmp_path / "models"), tmp_path / "a.yaml"
+    text = PICK.replace("mode: task", "mode: task\nlaunch: my_robot/my.launch")
+    with pytest.raises(ExperimentFault, match="there is no launch file my_robot/my.launch"):
+        read_experiment(text, path, resources, known)
+    launch = "modular_framework_api/start_framework.launch"
+    experiment = read_experiment(text, path, resources, known, launch=launch)
+    assert {one.settings.launch for one in experiment.combinations} == {launch}
+
+
 def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
     text = PICK.replace("planner: [RRTConnect, PRM]", "planner: [0.5, true, 3, word]").replace(
         "{/planner_name: $planner}", "{/a: $planner, /b: with $planner and $$}"

@@ -19,6 +19,7 @@ from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH
 from modular_framework_benchmark.modes.ros_disk_estimate import disk_text
 from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
@@ -47,6 +48,9 @@ def run_experiment(arguments: Sequence[str]) -> int:
     parser.add_argument("file", type=Path, help=f"experiment file, or its name in {API_PACKAGE}/experiments")
     parser.add_argument("--database", help="SQLite file or SQLAlchemy URL for the results; default: EXPERIMENT.db here")
     parser.add_argument("--dry-run", action="store_true", help="check the file and list its episodes without running")
+    parser.add_argument(
+        "--robot", metavar="PACKAGE", help="use the start_framework.launch of this package in the mode task"
+    )
     _add_run_options(parser)
     return _guarded(_run, parser.parse_args(arguments))
 
@@ -94,7 +98,9 @@ def _run(options: argparse.Namespace) -> int:
     # Imported here, because `resume` does not need roslaunch.
     from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 
-    experiment = load_experiment(experiment_path(options.file), RosResourceLookup(), known_metrics(), setting_checks())
+    launch = DEFAULT_LAUNCH.replace(API_PACKAGE, options.robot) if options.robot else ""
+    file = experiment_path(options.file)
+    experiment = load_experiment(file, RosResourceLookup(), known_metrics(), setting_checks(), launch)
     episodes = plan_episodes(experiment)
     if options.dry_run:
         from modular_framework_benchmark.statistics.planned_power import power_text  # slow to import

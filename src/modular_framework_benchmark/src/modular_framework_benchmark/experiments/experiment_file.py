@@ -49,7 +49,11 @@ KnownMetrics = Map[str, Map[str, Metric]]
 
 
 def load_experiment(
-    path: Path, resources: ResourceLookup, known_metrics: KnownMetrics, checks: SettingChecks | None = None
+    path: Path,
+    resources: ResourceLookup,
+    known_metrics: KnownMetrics,
+    checks: SettingChecks | None = None,
+    launch: str = "",
 ) -> Experiment:
     """Reads and checks an experiment file.
 
@@ -58,6 +62,7 @@ def load_experiment(
         resources: Lookup of launch files, tasks, models and packages.
         known_metrics: Metrics of each mode.
         checks: Checks of each mode that resolve the names in its settings; None to skip these checks.
+        launch: Launch file that replaces the key `launch`; "" to keep the key.
 
     Raises:
         ExperimentFault: The file is invalid; the error contains every fault.
@@ -69,7 +74,7 @@ def load_experiment(
         raise ExperimentFault([Fault(start, "there is no such file; name an experiment file (.yaml)")]) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ExperimentFault([Fault(start, f"the file cannot be read: {error}")]) from error
-    return read_experiment(text, path, resources, known_metrics, checks)
+    return read_experiment(text, path, resources, known_metrics, checks, launch=launch)
 
 
 def read_experiment(
@@ -78,6 +83,8 @@ def read_experiment(
     resources: ResourceLookup,
     known_metrics: KnownMetrics,
     checks: SettingChecks | None = None,
+    *,
+    launch: str = "",
 ) -> Experiment:
     """Reads and checks the text of an experiment file, as `load_experiment` does.
 
@@ -87,6 +94,7 @@ def read_experiment(
         resources: Lookup of the references.
         known_metrics: Metrics that need no definition.
         checks: Checks of the settings, keyed by mode.
+        launch: Launch file that replaces the key `launch`; "" to keep the key.
     """
     faults = FaultList()
     start = SourceLocation(str(path), 1, 1)
@@ -98,6 +106,8 @@ def read_experiment(
         raise ExperimentFault.of(error) from error
     if not isinstance(root, Mapping):
         raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
+    if launch:
+        root.entries["launch"], root.keys["launch"] = Scalar(launch, root.location), root.location
     reading = Reading(faults, path.resolve().parent, resources)
     experiment = _Reader(root, text, path, reading=reading, known_metrics=known_metrics, checks=checks or {}).read()
     if experiment is None:
