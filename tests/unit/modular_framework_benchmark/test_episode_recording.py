@@ -91,3 +91,14 @@ def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: py
     gripper = frames.values[ACTION][:, frames.names[ACTION].index("knuckle")]
     assert gripper == pytest.approx([0.1, 0.2, 1.2, 1.2]), "the measured position before the first command"
     assert "pan" in frames.names[ACTION]
+
+
+def test_a_place_that_cannot_be_planned_is_a_failed_plan_and_a_feasible_one_is_no_plan(tmp_path: Path) -> None:
+    samples = Samples()
+    samples.joints = states(published(0.4))
+    report = {"kind": "place", "time": 0.2, "reason": "place 0: reach: out of reach", "error_code": -31}
+    samples.planning = [(10.2, report), (10.3, {**report, "time": 0.3, "reason": "", "error_code": 1})]
+    answer = {"zero": 0.0, "simulated_s": 0.4}
+    write_recording(tmp_path, samples, NO_RECORD, spawned={}, answer=answer, rate_hz=RATE)
+    (found,) = json.loads((tmp_path / "recording.json").read_text())["reports"]
+    assert (found["component"], found["succeeded"], found["figures"]["error_code"]) == ("planning", False, -31)

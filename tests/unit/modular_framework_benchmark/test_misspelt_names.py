@@ -111,6 +111,17 @@ def test_a_parameter_of_a_node_of_ones_own_is_taken_when_it_is_listed(tmp_path: 
     assert experiment_faults({**content, "extra_parameters": ["/my_node/gain"]}, tmp_path) == ""
 
 
+def test_a_task_that_places_in_a_region_needs_the_region(tmp_path: Path) -> None:
+    placing = {**PLAIN, "task": "pick_and_place.yaml"}
+    goal = {"x": [0.1, 0.2], "y": [0.4, 0.5]}
+    assert "the region 'goal' is unknown; there is none" in experiment_faults(placing, tmp_path)
+    misspelt = experiment_faults({**placing, "regions": {"gaol": goal}}, tmp_path)
+    assert "pick_and_place.yaml:" in misspelt and "allowed: gaol" in misspelt and "did you mean 'gaol'" in misspelt
+    assert experiment_faults({**placing, "regions": {"goal": goal}}, tmp_path) == ""
+    on_launch = changed(placing, ("arguments", "regions"), "{goal: {x: [0.1, 0.2], y: [0.4, 0.5]}}")
+    assert experiment_faults(on_launch, tmp_path) == ""
+
+
 def test_all_faults_of_an_experiment_are_listed_at_once(tmp_path: Path) -> None:
     content = changed(TASK, ("parameters",), {"/planer_name": "$planner", "/robot_speed_factor": 7, "/max_torq": 1})
     faults = experiment_faults(changed(content, ("arguments", "physics_engine"), "bullet"), tmp_path)

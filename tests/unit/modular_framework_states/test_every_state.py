@@ -29,6 +29,7 @@ EXPECTED = {
     "wait_for_signal",
     "select",
     "plan",
+    "plan_place",
     "move",
     "grasp",
     "allow_manipulator_collisions",

@@ -233,7 +233,7 @@ def _planning(samples: Samples, origin_s: float) -> list[dict[str, Any]]:
     """Returns the reports of plans, each with the displayed motion that matches its start and goal."""
     unmatched = [path for path in samples.paths if path.trajectory]
     reports = []
-    plans = [entry for entry in samples.planning if entry[1]["kind"] in ("plan", "cartesian_path", "sequence")]
+    plans = [entry for entry in samples.planning if _is_plan(entry[1])]
     spans = [(wall - float(report.get("planning_time_s") or 0.0), wall) for wall, report in plans]
     for wall, report in plans:
         activity = {
@@ -256,6 +256,12 @@ def _planning(samples: Samples, origin_s: float) -> list[dict[str, Any]]:
         trajectory = motion.trajectory[-1].joint_trajectory if motion is not None else None
         reports.append(_report(activity, times_s, (wall - wall_s, wall), figures, trajectory))
     return reports
+
+
+def _is_plan(report: dict[str, Any]) -> bool:
+    """Returns whether a report is that of a plan; a feasible place is only the start of the plans to it."""
+    kind = report["kind"]
+    return kind in ("plan", "cartesian_path", "sequence") or (kind == "place" and report["error_code"] != 1)
 
 
 def _belongs(path: Any, report: dict[str, Any]) -> bool:

@@ -107,7 +107,11 @@ class TaskEpisodeRunner:
             "bag": settings.record.bag,
             "method_nodes": list(launch.method_nodes),
             "controllers": list(launch.controllers),
-            "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / TASK_RECORDS)},
+            "parameters": {
+                "/seed": end.spec.seed,
+                "/task/record_directory": str(end.folder / TASK_RECORDS),
+                "/regions": {region.name: region.as_parameter for region in settings.regions},
+            },
             "begun": end.begun_monotonic,
         }
         remaining_s = settings.time_limit - (time.monotonic() - end.begun_monotonic)

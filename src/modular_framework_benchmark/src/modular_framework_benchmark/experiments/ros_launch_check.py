@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from modular_framework_ros.allowed_names import closest, listing, nearest
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"
 RUN_TASK, ARGUMENTS = "run_task", "arguments"
+REGIONS = "/regions"
 
 
 class LaunchCheck:
@@ -44,12 +45,18 @@ class LaunchCheck:
         launch: Preview of the launch file.
         given: Overriding parameters, keyed by full name.
         extra: Names of overriding parameters that the user's own nodes read.
+        regions: Names of regions that episodes set besides those of the launch.
     """
 
     def __init__(
-        self, launch: LaunchPreview, given: Mapping[str, Any] | None = None, extra: Container[str] = ()
+        self,
+        launch: LaunchPreview,
+        given: Mapping[str, Any] | None = None,
+        extra: Container[str] = (),
+        regions: Collection[str] = (),
     ) -> None:
         self._given, self._extra = dict(given or {}), extra
+        self._regions = {*regions, *launch.below(REGIONS)}
         self.launch = launch.with_parameters(self._given)
         self._names = DeclaredNames(self.launch)
         self._pipelines: tuple[str, ...] = ()
@@ -228,6 +235,7 @@ class LaunchCheck:
         names = names_of_config(Path(config)) if config else KnownNames()
         srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
         names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
+        names = names.with_regions(self._regions, "the launch argument 'regions', or to 'regions' of the experiment")
         registry = self.registry()
         return names if registry is None else names.with_planners(lambda: PlannerNames(registry.by_pipeline()))
 

@@ -140,7 +140,8 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
         launch = preview_stack(settings).preview
     except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
-    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters)
+    regions = [region.name for region in settings.regions]
+    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters, regions)
     found = check.faults() if is_known else check.faults_of_values()
     faults = tuple(
         SettingFault((item.key, item.name) if item.name else (item.key,), item.text)

@@ -53,6 +53,11 @@ class Region:
         )
 
     @property
+    def as_parameter(self) -> dict[str, list[float]]:
+        """Returns the region as an entry of the ROS parameter /regions, {axis: [LOW, HIGH]} [m]."""
+        return {"xyz"[axis]: list(span) for axis, span in self._spans}
+
+    @property
     def _spans(self) -> list[tuple[int, Span]]:
         return [(axis, span) for axis, span in enumerate((self.x, self.y, self.z)) if span is not None]
 

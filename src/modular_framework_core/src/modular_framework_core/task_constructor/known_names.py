@@ -49,7 +49,7 @@ class PlannerNames(Collection[str]):
 
 @dataclass(frozen=True, slots=True)
 class KnownNames:
-    """Known names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, planner.
+    """Known names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, region, planner.
 
     Attributes:
         names: Kind -> known names, except for planners. Names of an absent kind are not checked.
@@ -74,6 +74,16 @@ class KnownNames:
         return replace(
             self, names=merged | {"plan": merged.get("plan", frozenset()) | further_names.get("plan", frozenset())}
         )
+
+    def with_regions(self, regions: Collection[str], origin: str) -> KnownNames:
+        """Returns a copy with named regions.
+
+        Args:
+            regions: Names of the regions.
+            origin: Source of the regions, for messages.
+        """
+        names, origins = {**self.names, "region": frozenset(regions)}, {**self.origins, "region": origin}
+        return replace(self, names=names, origins=origins)
 
     def with_planners(self, planners: Callable[[], PlannerNames | None]) -> KnownNames:
         """Returns a copy with the function that returns the available planners; the copy calls the function once."""

@@ -25,7 +25,7 @@ from modular_framework_core.task_constructor.userdata_checks import declared_key
 from modular_framework_ros.allowed_names import listing, nearest
 
 _PLURALS = {"trajectory": "trajectories"}
-_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", PLANNER: "planner"}
+_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", "region": "region", PLANNER: "planner"}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
