@@ -85,7 +85,7 @@ def run_in_real_time(priority: int = PRIORITY, others_priority: int = OTHERS_PRI
 
 
 def leave_real_time() -> None:
-    """Restores ordinary scheduling of all threads, so that a long shutdown does not block other processes."""
+    """Restores ordinary scheduling of all threads; call while the robot is at rest, as shutdown takes long."""
     for thread in map(int, os.listdir("/proc/self/task")):
         with contextlib.suppress(OSError):  # the thread has ended
             os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
