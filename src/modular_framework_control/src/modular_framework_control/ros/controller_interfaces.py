@@ -41,6 +41,7 @@ from modular_framework_control.ros.controller_action_server import (
     GoalCallbacks,
     GoalRefusedError,
 )
+from modular_framework_control.ros.controller_connection import ControllerConnection
 from modular_framework_control.ros.joint_command_interface import JointCommandRosInterface, joint_control_to_msg
 from modular_framework_control.ros.mobile_base_interfaces import (
     DiffDriveRosInterface,
@@ -63,9 +64,6 @@ from modular_framework_control.trajectory.trajectory_goal import (
 from modular_framework_ros.node_handle import join_names
 from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
-QUEUE_SIZE = 50
-"""Length of the publishers' queues: a simulation that runs faster than real time sends messages in bursts."""
-
 PID_GAINS = (
     Adjustable("p", -1e5, 1e5, "command per error"),
     Adjustable("i", -1e5, 1e5, "command per integral of the error"),
@@ -79,18 +77,11 @@ PID_GAINS = (
 class JointStateRosInterface:
     """Publishes `joint_states` (sensor_msgs/JointState) in the namespace of the robot."""
 
-    def __init__(
-        self, controller: JointStateController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
-        del name
-        self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=QUEUE_SIZE)
-        controller.on_state = lambda snapshot: outbox.publish(
-            self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s)
+    def __init__(self, controller: JointStateController, connection: ControllerConnection) -> None:
+        publish = connection.advertise(join_names(connection.namespace, "joint_states"), JointState)
+        controller.on_state = lambda snapshot: publish(
+            lambda: conversions.joint_state_to_msg(snapshot, connection.ahead_s)
         )
-
-    def close(self) -> None:
-        """Closes the topic."""
-        self._publisher.unregister()
 
 
 class JointTrajectoryRosInterface:
@@ -100,64 +91,51 @@ class JointTrajectoryRosInterface:
     the service `<name>/query_state`.
     """
 
-    def __init__(
-        self, controller: JointTrajectoryController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
-        self._controller = controller
-        self._name = join_names(namespace, name)
-        self._loop_time = loop_time
-        with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
-            self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=QUEUE_SIZE)
-            opened.callback(self._state.unregister)
-            self._action = ControllerActionServer(
-                f"{self._name}/follow_joint_trajectory",
-                CompactFollowJointTrajectoryAction,
-                GoalCallbacks(submit=self._submit, cancel=controller.cancel, make_result=_trajectory_result),
-                outbox,
-            )
-            opened.callback(self._action.close)
-            query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
-            opened.callback(query.shutdown, "controller unloaded")
-            command = rospy.Subscriber(f"{self._name}/command", CompactJointTrajectory, self._on_command, queue_size=1)
-            opened.callback(command.unregister)
-            self._opened = opened.pop_all()
-        controller.on_state = lambda snapshot: outbox.publish(
-            self._state,
-            lambda: conversions.fill_snapshot(
-                JointTrajectoryControllerState(), snapshot, controller.joint_names, loop_time.ahead_s
-            ),
+    def __init__(self, controller: JointTrajectoryController, connection: ControllerConnection) -> None:
+        self._controller, self._connection = controller, connection
+        publish = connection.advertise("state", JointTrajectoryControllerState)
+        self._action = ControllerActionServer(
+            connection.topic("follow_joint_trajectory"),
+            CompactFollowJointTrajectoryAction,
+            GoalCallbacks(submit=self._submit, cancel=controller.cancel, make_result=_trajectory_result),
+            connection.outbox,
         )
-        controller.on_feedback = lambda goal_handle, snapshot: outbox.put_droppable(
+        connection.opened.callback(self._action.close)
+        query = rospy.Service(connection.topic("query_state"), QueryTrajectoryState, self._on_query)
+        connection.opened.callback(query.shutdown, "controller unloaded")
+        connection.subscribe("command", CompactJointTrajectory, self._on_command)
+        controller.on_state = lambda snapshot: publish(
+            lambda: conversions.fill_snapshot(
+                JointTrajectoryControllerState(), snapshot, controller.joint_names, connection.ahead_s
+            )
+        )
+        controller.on_feedback = lambda goal_handle, snapshot: connection.outbox.put_droppable(
             self._feedback, goal_handle, snapshot
         )
 
-    def close(self) -> None:
-        """Closes the topics, the action and the service."""
-        self._opened.close()
-
     def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
         try:
-            self._controller.submit(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
+            self._controller.submit(conversions.goal_from_msg(message, self._connection.ahead_s), goal_handle)
         except GoalRejectedError as error:
             result = conversions.trajectory_result_to_msg(error.code, str(error))
             raise GoalRefusedError(result, str(error)) from error
 
     def _on_command(self, message: CompactJointTrajectory) -> None:
         try:
-            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
+            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._connection.ahead_s)))
         except GoalRejectedError as error:
-            rospy.logwarn("%s/command ignored: %s", self._name, error)
+            rospy.logwarn("%s/command ignored: %s", self._connection.name, error)
 
     def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
         try:
-            state = self._controller.desired_at(request.time.to_sec() - self._loop_time.ahead_s)
+            state = self._controller.desired_at(request.time.to_sec() - self._connection.ahead_s)
         except ControllerError as error:
-            raise rospy.ServiceException(f"{self._name}/query_state: {error}") from error
+            raise rospy.ServiceException(f"{self._connection.name}/query_state: {error}") from error
         return QueryTrajectoryStateResponse(self._controller.joint_names, *(row.tolist() for row in state))
 
     def _feedback(self, goal_handle: TrajectoryGoalHandle, snapshot: TrajectorySnapshot) -> None:
         message = conversions.fill_snapshot(
-            FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names, self._loop_time.ahead_s
+            FollowJointTrajectoryFeedback(), snapshot, self._controller.joint_names, self._connection.ahead_s
         )
         self._action.publish_feedback(goal_handle, message)
 
@@ -174,34 +152,22 @@ class GripperRosInterface:
     (control_msgs/JointControllerState).
     """
 
-    def __init__(
-        self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
+    def __init__(self, controller: GripperActionController, connection: ControllerConnection) -> None:
         self._controller = controller
-        with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
-            state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=QUEUE_SIZE)
-            opened.callback(state.unregister)
-            self._action = ControllerActionServer(
-                join_names(namespace, f"{name}/gripper_cmd"),
-                GripperCommandAction,
-                GoalCallbacks(
-                    submit=self._submit,
-                    cancel=controller.cancel,
-                    make_result=_gripper_result,
-                    is_fault=_is_gripper_fault,
-                ),
-                outbox,
-            )
-            opened.callback(self._action.close)
-            self._opened = opened.pop_all()
-        controller.on_state = lambda snapshot: outbox.publish(
-            state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s)
+        publish = connection.advertise("state", JointControllerState)
+        self._action = ControllerActionServer(
+            connection.topic("gripper_cmd"),
+            GripperCommandAction,
+            GoalCallbacks(
+                submit=self._submit, cancel=controller.cancel, make_result=_gripper_result, is_fault=_is_gripper_fault
+            ),
+            connection.outbox,
         )
-        controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
-
-    def close(self) -> None:
-        """Closes the topic and the action."""
-        self._opened.close()
+        connection.opened.callback(self._action.close)
+        controller.on_state = lambda snapshot: publish(lambda: joint_control_to_msg(snapshot, connection.ahead_s))
+        controller.on_feedback = lambda goal_handle, state: connection.outbox.put_droppable(
+            self._feedback, goal_handle, state
+        )
 
     def _submit(self, message: GripperCommandGoal, goal_handle: GripperGoalHandle) -> None:
         try:
@@ -249,13 +215,16 @@ def attach_ros(
     Returns:
         Callback that closes all of them.
     """
-    with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
+    with contextlib.ExitStack() as opened:  # closes what is open if a later connection fails
+        connection = ControllerConnection(
+            namespace=namespace, name=join_names(namespace, name), outbox=outbox, loop_time=loop_time, opened=opened
+        )
         for controller_class, ros_interface in _ROS_INTERFACES:
             if isinstance(controller, controller_class):
-                opened.callback(ros_interface(controller, namespace, name, outbox, loop_time).close)
+                ros_interface(controller, connection)
                 break
         for pid_name, pid in controller.pids.items():
-            gains = Reconfiguration(join_names(namespace, f"{name}/{pid_name}"), PID_GAINS, pid, "gains")
+            gains = Reconfiguration(connection.topic(pid_name), PID_GAINS, pid, "gains")
             opened.callback(gains.close)
             gains.connect()
         return opened.pop_all().close

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import rospy
 from control_msgs.msg import JointControllerState
 from std_msgs.msg import Float64, Float64MultiArray
@@ -15,9 +13,7 @@ from modular_framework_control.controllers.joint_command_controllers import (
     JointCommandController,
     JointControlSnapshot,
 )
-from modular_framework_control.realtime.loop_time import LoopTime
-from modular_framework_control.ros.outbox import Outbox
-from modular_framework_ros.node_handle import join_names
+from modular_framework_control.ros.controller_connection import ControllerConnection
 
 
 class JointCommandRosInterface:
@@ -27,21 +23,13 @@ class JointCommandRosInterface:
     Publishes `<name>/state` (control_msgs/JointControllerState) for a PID controller of one joint.
     """
 
-    def __init__(
-        self, controller: JointCommandController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
+    def __init__(self, controller: JointCommandController, connection: ControllerConnection) -> None:
         self._controller = controller
-        self._topic = join_names(namespace, f"{name}/command")
-        message_class = Float64 if controller.single else Float64MultiArray
-        with contextlib.ExitStack() as opened:  # closes the opened topics if a later one fails
-            opened.callback(rospy.Subscriber(self._topic, message_class, self._on_command, queue_size=1).unregister)
-            if isinstance(controller, GainsController) and controller.single:
-                state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=1)
-                opened.callback(state.unregister)
-                controller.on_state = lambda snapshot: outbox.publish(
-                    state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s)
-                )
-            self._opened = opened.pop_all()
+        self._topic = connection.topic("command")
+        connection.subscribe("command", Float64 if controller.single else Float64MultiArray, self._on_command)
+        if isinstance(controller, GainsController) and controller.single:
+            publish = connection.advertise("state", JointControllerState, queue_size=1)
+            controller.on_state = lambda snapshot: publish(lambda: joint_control_to_msg(snapshot, connection.ahead_s))
 
     def _on_command(self, message: Float64 | Float64MultiArray) -> None:
         values = [message.data] if self._controller.single else list(message.data)
@@ -49,10 +37,6 @@ class JointCommandRosInterface:
             self._controller.submit(values)
         except ControllerError as error:
             rospy.logwarn_throttle(1.0, f"{self._topic} ignored: {error}")
-
-    def close(self) -> None:
-        """Closes the topics."""
-        self._opened.close()
 
 
 def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> JointControllerState:

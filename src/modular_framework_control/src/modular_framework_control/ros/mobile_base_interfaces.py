@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from typing import Any
 
@@ -26,9 +25,7 @@ from modular_framework_control.mobile_base.mobile_base_controller import (
     MobileBaseController,
     OdometrySnapshot,
 )
-from modular_framework_control.realtime.loop_time import LoopTime
-from modular_framework_control.ros.outbox import Outbox
-from modular_framework_ros.node_handle import join_names
+from modular_framework_control.ros.controller_connection import ControllerConnection
 from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
 QUEUE_SIZE = 100
@@ -48,44 +45,23 @@ class MobileBaseRosInterface:
     the frame of the base on `/tf`.
     """
 
-    def __init__(
-        self, controller: MobileBaseController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
-        self._controller, self._name = controller, join_names(namespace, name)
-        self._outbox, self._loop_time = outbox, loop_time
-        with contextlib.ExitStack() as opened:  # closes the opened topics if a later one fails
-            self._open(opened)
-            self._opened = opened.pop_all()
-
-    def close(self) -> None:
-        """Closes the topics."""
-        self._opened.close()
-
-    def _open(self, opened: contextlib.ExitStack) -> None:
-        odom = self._advertise(opened, "odom", Odometry)
-        tf = self._advertise(opened, "/tf", TFMessage)
-        self._subscribe(opened, "cmd_vel", Twist, lambda twist: BaseVelocity(twist.linear.x, twist.angular.z))
-        frames = self._controller.frames
+    def __init__(self, controller: MobileBaseController, connection: ControllerConnection) -> None:
+        self._controller, self._connection = controller, connection
+        publish_odometry = connection.advertise("odom", Odometry, QUEUE_SIZE)
+        publish_frame = connection.advertise("/tf", TFMessage, QUEUE_SIZE)
+        self._subscribe("cmd_vel", Twist, lambda twist: BaseVelocity(twist.linear.x, twist.angular.z))
 
         def report(snapshot: OdometrySnapshot) -> None:
-            ahead_s = self._loop_time.ahead_s
-            self._outbox.publish(odom, lambda: odometry_to_msg(snapshot, frames, ahead_s))
+            frames, ahead_s = controller.frames, connection.ahead_s
+            publish_odometry(lambda: odometry_to_msg(snapshot, frames, ahead_s))
             if snapshot.with_tf:
-                self._outbox.publish(tf, lambda: transform_to_msg(snapshot, frames, ahead_s))
+                publish_frame(lambda: transform_to_msg(snapshot, frames, ahead_s))
 
-        self._controller.on_odometry = report
+        controller.on_odometry = report
 
-    def _advertise(self, opened: contextlib.ExitStack, topic: str, message_class: Any) -> rospy.Publisher:
-        publisher = rospy.Publisher(self._topic(topic), message_class, queue_size=QUEUE_SIZE)
-        opened.callback(publisher.unregister)
-        return publisher
-
-    def _topic(self, topic: str) -> str:
-        return topic if topic.startswith("/") else f"{self._name}/{topic}"
-
-    def _subscribe(self, opened: contextlib.ExitStack, topic: str, message_class: Any, command_of: Any) -> None:
+    def _subscribe(self, topic: str, message_class: Any, command_of: Any) -> None:
         """Passes each message of a topic, converted by `command_of`, to the controller."""
-        name = self._topic(topic)
+        name = self._connection.topic(topic)
         subscribers: list[rospy.Subscriber] = []  # a message may arrive before the subscriber is stored
 
         def on_message(message: Any) -> None:
@@ -95,7 +71,7 @@ class MobileBaseRosInterface:
                 rospy.logerr_throttle(
                     1.0,
                     f"{name}: got {publishers} publishers; expected one, as "
-                    f"{self._name}/allow_multiple_cmd_vel_publishers is false; the base stops: "
+                    f"{self._connection.name}/allow_multiple_cmd_vel_publishers is false; the base stops: "
                     "end the other publishers",
                 )
                 return
@@ -104,8 +80,7 @@ class MobileBaseRosInterface:
             except ControllerError as error:
                 rospy.logwarn_throttle(1.0, f"{name} ignored: {error}")
 
-        subscribers.append(rospy.Subscriber(name, message_class, on_message, queue_size=1))
-        opened.callback(subscribers[0].unregister)
+        subscribers.append(self._connection.subscribe(topic, message_class, on_message))
 
 
 class DiffDriveRosInterface(MobileBaseRosInterface):
@@ -115,23 +90,23 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
     (control_msgs/JointTrajectoryControllerState).
     """
 
-    _controller: DiffDriveController
-
-    def _open(self, opened: contextlib.ExitStack) -> None:
-        super()._open(opened)
-        controller, names = self._controller, self._controller.wheel_names
+    def __init__(self, controller: DiffDriveController, connection: ControllerConnection) -> None:
+        super().__init__(controller, connection)
+        names = controller.wheel_names
         if controller.publishes_command:
-            command = self._advertise(opened, "cmd_vel_out", TwistStamped)
-            controller.on_command = lambda time_s, velocity: self._outbox.publish(
-                command, lambda: velocity_to_msg(time_s + self._loop_time.ahead_s, velocity)
+            publish_command = connection.advertise("cmd_vel_out", TwistStamped, QUEUE_SIZE)
+            controller.on_command = lambda time_s, velocity: publish_command(
+                lambda: velocity_to_msg(time_s + connection.ahead_s, velocity)
             )
         if controller.publishes_wheels:
-            wheels = self._advertise(opened, "wheel_joint_controller_state", JointTrajectoryControllerState)
-            controller.on_wheels = lambda time_s, states: self._outbox.publish(
-                wheels, lambda: wheels_to_msg(time_s + self._loop_time.ahead_s, names, states)
+            publish_wheels = connection.advertise(
+                "wheel_joint_controller_state", JointTrajectoryControllerState, QUEUE_SIZE
             )
-        settings = Reconfiguration(self._name, DIFF_DRIVE_SETTINGS, controller, "settings")
-        opened.callback(settings.close)
+            controller.on_wheels = lambda time_s, states: publish_wheels(
+                lambda: wheels_to_msg(time_s + connection.ahead_s, names, states)
+            )
+        settings = Reconfiguration(connection.name, DIFF_DRIVE_SETTINGS, controller, "settings")
+        connection.opened.callback(settings.close)
         settings.connect()
 
 
@@ -142,23 +117,20 @@ class FourWheelSteeringRosInterface(MobileBaseRosInterface):
     `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped).
     """
 
-    _controller: FourWheelSteeringController
-
-    def _open(self, opened: contextlib.ExitStack) -> None:
+    def __init__(self, controller: FourWheelSteeringController, connection: ControllerConnection) -> None:
         # Imported here, as no other controller needs this message package.
         from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 
-        super()._open(opened)
+        super().__init__(controller, connection)
         self._subscribe(
-            opened,
             "cmd_four_wheel_steering",
             FourWheelSteering,
             lambda command: SteeringCommand(command.speed, command.front_steering_angle, command.rear_steering_angle),
         )
-        steer = self._advertise(opened, "odom_steer", FourWheelSteeringStamped)
-        frame = self._controller.frames.odom
-        self._controller.on_steering = lambda snapshot: self._outbox.publish(
-            steer, lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, self._loop_time.ahead_s)
+        publish_steering = connection.advertise("odom_steer", FourWheelSteeringStamped, QUEUE_SIZE)
+        frame = controller.frames.odom
+        controller.on_steering = lambda snapshot: publish_steering(
+            lambda: fill_steering(FourWheelSteeringStamped(), snapshot, frame, connection.ahead_s)
         )
 
 

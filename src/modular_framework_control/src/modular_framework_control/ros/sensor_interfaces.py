@@ -24,8 +24,7 @@ from modular_framework_control.hardware_interface.interfaces import (
     ImuSensorInterface,
     SpeedScalingInterface,
 )
-from modular_framework_control.realtime.loop_time import LoopTime
-from modular_framework_control.ros.outbox import Outbox
+from modular_framework_control.ros.controller_connection import ControllerConnection
 from modular_framework_ros.node_handle import join_names
 
 
@@ -36,26 +35,18 @@ class SensorRosInterface:
     and std_msgs/Float64 for speed scaling.
     """
 
-    def __init__(
-        self, controller: SensorController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
-    ) -> None:
-        del name
+    def __init__(self, controller: SensorController, connection: ControllerConnection) -> None:
         message_class, to_msg = _MESSAGES[controller.interface_class]
-        self._publishers = {
-            sensor: rospy.Publisher(join_names(namespace, sensor), message_class, queue_size=4)
+        publish = {
+            sensor: connection.advertise(join_names(connection.namespace, sensor), message_class, queue_size=4)
             for sensor in controller.sensor_names
         }
 
         def report(time_s: float, handle: Any) -> None:
             reading = copy.copy(handle)  # the loop changes the handle in the next cycle
-            outbox.publish(self._publishers[handle.name], lambda: to_msg(time_s + loop_time.ahead_s, reading))
+            publish[handle.name](lambda: to_msg(time_s + connection.ahead_s, reading))
 
         controller.on_reading = report
-
-    def close(self) -> None:
-        """Closes the topics."""
-        for publisher in self._publishers.values():
-            publisher.unregister()
 
 
 def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
