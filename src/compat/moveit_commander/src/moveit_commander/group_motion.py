@@ -54,12 +54,7 @@ class GroupMotion(GroupPoseTargets):
         Returns:
             Success, trajectory, planning time [s] and error code.
         """
-        if isinstance(joints, str):
-            self.set_joint_value_target(self._named_values(joints))
-        elif isinstance(joints, Pose | PoseStamped):
-            self.set_pose_target(joints)
-        elif joints is not None:
-            self.set_joint_value_target(joints)
+        self._set_target(joints)
         goal = self._goal(plan_only=True)
         result = self._servers.action(MOVE_ACTION, MoveGroupAction).run(goal, self._planning_limit_s())
         worked = self._check_result(result.error_code, "plan")
@@ -77,12 +72,7 @@ class GroupMotion(GroupPoseTargets):
         """
         if isinstance(joints, bool):
             wait, joints = joints, None
-        elif isinstance(joints, Pose | PoseStamped):
-            self.set_pose_target(joints)
-        elif isinstance(joints, str):
-            self.set_joint_value_target(self._named_values(joints))
-        elif joints is not None:
-            self.set_joint_value_target(joints)
+        self._set_target(joints)
         caller, goal = self._servers.action(MOVE_ACTION, MoveGroupAction), self._goal(plan_only=False)
         if not wait:
             caller.send(goal)
@@ -151,6 +141,15 @@ class GroupMotion(GroupPoseTargets):
             self._check_result(response.error_code, "compute_cartesian_path")
             return RobotTrajectory(), -1.0
         return response.solution, response.fraction
+
+    def _set_target(self, target: Any) -> None:
+        """Sets the target in an argument of plan or go; None keeps the current target."""
+        if isinstance(target, str):
+            self.set_joint_value_target(self._named_values(target))
+        elif isinstance(target, Pose | PoseStamped):
+            self.set_pose_target(target)
+        elif target is not None:
+            self.set_joint_value_target(target)
 
     def _named_values(self, name: str) -> dict[str, float]:
         """Returns the joint values of a remembered or named target."""

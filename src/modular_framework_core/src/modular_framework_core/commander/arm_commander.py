@@ -32,10 +32,10 @@ from moveit_msgs.srv import (
 from sensor_msgs.msg import JointState
 
 from modular_framework_core.commander.moveit_requests import (
+    JOINT_TOLERANCE_RAD,
     StartState,
     describe_pose,
     error_name,
-    joint_goal,
     joints_of,
     pose_goal,
     robot_state,
@@ -57,6 +57,7 @@ from modular_framework_ros.calls import (
     wait_until,
 )
 from modular_framework_ros.ros_frozen_nodes import frozen_nodes
+from modular_framework_ros.ros_goal_constraints import joint_goal
 from modular_framework_ros.seeds import seed_parameter
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
@@ -290,7 +291,7 @@ class ArmCommander:
                 f"the target names the joints {sorted(values)}, group '{self.group_name}' has "
                 f"{list(self.group.joint_names)}; name joints of the group",
             )
-        return self._plan(lambda name: joint_goal(target, name), custom_start_state)
+        return self._plan(lambda name: joint_goal(target, JOINT_TOLERANCE_RAD, name), custom_start_state)
 
     def get_ik(self, pose: PoseStamped, seed: StartState = None) -> dict[str, float] | None:
         """Returns joint positions [rad or m] for a pose of the tip link, or None without a solution."""

@@ -6,17 +6,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 
-from geometry_msgs.msg import Pose, PoseStamped
-from moveit_msgs.msg import (
-    Constraints,
-    JointConstraint,
-    MoveItErrorCodes,
-    OrientationConstraint,
-    PositionConstraint,
-    RobotState,
-)
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import Constraints, MoveItErrorCodes, RobotState
 from sensor_msgs.msg import JointState
-from shape_msgs.msg import SolidPrimitive
+
+from modular_framework_ros.ros_goal_constraints import orientation_goal, position_goal
 
 JOINT_TOLERANCE_RAD = 1e-4
 POSITION_TOLERANCE_M = 1e-4
@@ -53,26 +47,6 @@ def robot_state(state: StartState) -> RobotState:
             return RobotState(joint_state=joints, is_diff=True)
 
 
-def joint_goal(joints: Mapping[str, float], name: str = "") -> Constraints:
-    """Returns a joint-space goal.
-
-    Args:
-        joints: {joint: position} [rad or m].
-        name: Name of the constraints.
-    """
-    constraints = [
-        JointConstraint(
-            joint_name=joint,
-            position=position,
-            tolerance_above=JOINT_TOLERANCE_RAD,
-            tolerance_below=JOINT_TOLERANCE_RAD,
-            weight=1.0,
-        )
-        for joint, position in joints.items()
-    ]
-    return Constraints(name=name, joint_constraints=constraints)
-
-
 def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
     """Returns a goal for the pose of a link.
 
@@ -81,23 +55,11 @@ def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
         link: Name of the link.
         name: Name of the constraints.
     """
-    region = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
-    region.constraint_region.primitives = [
-        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE_M])
-    ]
-    centre = Pose(position=pose.pose.position)
-    centre.orientation.w = 1.0
-    region.constraint_region.primitive_poses = [centre]
-    orientation = OrientationConstraint(
-        header=pose.header,
-        link_name=link,
-        orientation=pose.pose.orientation,
-        weight=1.0,
-        absolute_x_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
-        absolute_y_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
-        absolute_z_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
+    return Constraints(
+        name=name,
+        position_constraints=[position_goal(link, pose, POSITION_TOLERANCE_M)],
+        orientation_constraints=[orientation_goal(link, pose, ORIENTATION_TOLERANCE_RAD)],
     )
-    return Constraints(name=name, position_constraints=[region], orientation_constraints=[orientation])
 
 
 def joints_of(state: JointState, names: Sequence[str]) -> dict[str, float]:

@@ -10,15 +10,22 @@ from moveit_msgs.msg import Constraints, JointConstraint, OrientationConstraint,
 from shape_msgs.msg import SolidPrimitive
 
 
-def joint_goal(positions: Mapping[str, float], tolerance: float) -> Constraints:
-    """Returns constraints of every joint to its position within a tolerance [rad or m]."""
+def joint_goal(positions: Mapping[str, float], tolerance: float, name: str = "") -> Constraints:
+    """Returns constraints of every joint to its position.
+
+    Args:
+        positions: Position of each joint [rad or m].
+        tolerance: Tolerance in both directions [rad or m].
+        name: Name of the constraints.
+    """
     return Constraints(
+        name=name,
         joint_constraints=[
             JointConstraint(
-                joint_name=name, position=position, tolerance_above=tolerance, tolerance_below=tolerance, weight=1.0
+                joint_name=joint, position=position, tolerance_above=tolerance, tolerance_below=tolerance, weight=1.0
             )
-            for name, position in positions.items()
-        ]
+            for joint, position in positions.items()
+        ],
     )
 
 
