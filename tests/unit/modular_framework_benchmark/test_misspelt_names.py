@@ -18,8 +18,7 @@ import rospkg
 import yaml
 
 from modular_framework_benchmark.commands.mode_runners import known_metrics
-from modular_framework_benchmark.experiments.design import plan_episodes
-from modular_framework_benchmark.experiments.design_text import design_text
+from modular_framework_benchmark.experiments.design import design_text, plan_episodes
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup

@@ -20,10 +20,9 @@ from modular_framework_benchmark.experiments.design import digest_of, plan_episo
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
-from modular_framework_benchmark.scheduling import local_pool, stopping
-from modular_framework_benchmark.scheduling.episode_queue import EpisodeQueue
+from modular_framework_benchmark.scheduling import experiment_run, local_pool
 from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory
-from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
+from modular_framework_benchmark.scheduling.experiment_run import EpisodeQueue, ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool
 from modular_framework_benchmark.scheduling.marked_processes import MARK, end_marked_processes, marked_processes
 from modular_framework_benchmark.scheduling.progress import Progress
@@ -119,7 +118,7 @@ def test_a_worker_that_cannot_start_ends_the_run_with_what_it_said(bench: Bench)
 def test_a_stopping_rule_is_asked_after_each_trial_and_ends_the_run(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stopping, "PAUSE_FACTOR", 0.0)
+    monkeypatch.setattr(experiment_run, "PAUSE_FACTOR", 0.0)
 
     class AfterOneTrial:
         seen: list[int] = []

@@ -15,7 +15,7 @@ from modular_framework_benchmark.experiments.planning_mode import PlanningSettin
 from modular_framework_benchmark.experiments.problem_sets import Problem
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings
-from modular_framework_benchmark.statistics.corrections import holm_tarone
+from modular_framework_benchmark.statistics.analysis import holm_tarone
 from modular_framework_benchmark.statistics.planned_power import power_text
 from modular_framework_benchmark.statistics.power import (
     detectable_difference,

@@ -10,8 +10,7 @@ import pytest
 import roslaunch.core
 
 from modular_framework_core.launching.launch_arguments import check_arguments
-from modular_framework_core.launching.launch_causes import cause_of_death
-from modular_framework_core.launching.launch_runner import EndWatcher, verdict
+from modular_framework_core.launching.launch_runner import EndWatcher, cause_of_death, verdict
 
 LAUNCH = """<launch><arg name="simulation" default="true"/><arg name="gui" default="$(eval 1 == 2)"/>
 <arg name="world_file" default="a.world"/></launch>"""

@@ -14,8 +14,7 @@ import rospkg
 from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
 from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics, setting_checks
 from modular_framework_benchmark.commands.stopping_rules import settings_of
-from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
-from modular_framework_benchmark.experiments.design_text import design_text
+from modular_framework_benchmark.experiments.design import design_text, digest_of, plan_episodes
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault

@@ -21,7 +21,6 @@ from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.grasp_reach import GraspReach
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
-from modular_framework_benchmark.modes.method_parameters import GivenParameters
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
@@ -44,6 +43,7 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     measure_gripper,
 )
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.parameter_declarations import NodeDeclaration, node_declaration
 from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE, Figure
 
@@ -181,3 +181,31 @@ def _reason(method: GraspMethod, candidates: list[GraspCandidate], travels: list
             return f"none of {len(travels)} checked grasps (of {len(candidates)} candidates) is reachable"
         case _:
             return f"no part of it can be grasped {method.manner}"
+
+
+class GivenParameters:
+    """Reads given or default parameters; implements `ReadNumber` of the grasp methods.
+
+    Args:
+        values: Values by name, without the ~ of private parameters.
+        declared: Parameters that the method declares.
+
+    Raises:
+        ModeError: The method does not declare a parameter, or a value is not allowed.
+    """
+
+    def __init__(self, values: Mapping[str, Any], declared: NodeDeclaration) -> None:
+        own = {name[1:]: item for name, item in declared.parameters.items() if name.startswith("~")}
+        faults = []
+        for name, value in values.items():
+            if name not in own:
+                faults.append(f"the method has no '{name}'; {listing(sorted(own))}{nearest(name, own)}")
+            elif own[name].fault(value):
+                faults.append(f"'{name}' {own[name].fault(value)}")
+        if faults:
+            raise ModeError(f"method_parameters: {'; '.join(faults)}")
+        self._values = {name: values.get(name, item.default) for name, item in own.items()}
+
+    def __call__(self, name: str) -> Any:
+        """Returns the given value of a parameter, or its default."""
+        return self._values[name.removeprefix("~")]

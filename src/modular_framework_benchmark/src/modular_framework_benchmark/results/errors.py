@@ -65,7 +65,6 @@ class RecordNotStoredError(ResultsError):
 
     Attributes:
         saved_to: File with the record; None if no file could be written.
-        record_json: Record as JSON.
     """
 
     def __init__(self, cause: StorageError, key: str, saved_to: Path | None, record_json: str) -> None:
@@ -76,7 +75,6 @@ class RecordNotStoredError(ResultsError):
         )
         super().__init__(f"{cause}; episode {key!r} is finished: {kept}")
         self.saved_to = saved_to
-        self.record_json = record_json
 
 
 _ADVICE: dict[str, tuple[type[StorageError], str]] = {

@@ -4,20 +4,111 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modular_framework_benchmark.experiments.design import stack_of
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.scheduling.disk_guard import DiskGuard
 from modular_framework_benchmark.scheduling.earlier_tries import forget_tries
-from modular_framework_benchmark.scheduling.episode_queue import EpisodeQueue
 from modular_framework_benchmark.scheduling.local_pool import Pool
 from modular_framework_benchmark.scheduling.progress import Progress
-from modular_framework_benchmark.scheduling.stopping import TrialWatch
+
+if TYPE_CHECKING:  # the statistics take seconds to import
+    from modular_framework_benchmark.statistics.stopping import StoppingRule
+
+PAUSE_FACTOR = 10.0
+"""Pause between interim analyses as a multiple of their duration, which bounds their cost."""
+
+
+class TrialWatch:
+    """Applies a stopping rule when all episodes of a trial have ended.
+
+    Args:
+        rule: Stopping rule; None to run all episodes.
+        load: Function that loads the results so far.
+        pending: Remaining episodes.
+    """
+
+    def __init__(
+        self, rule: StoppingRule | None, load: Callable[[], ExperimentResults], pending: Iterable[EpisodeSpec]
+    ) -> None:
+        self._rule, self._load = rule, load
+        self._remaining: dict[int, int] = {}
+        for spec in pending:
+            self._remaining[spec.trial] = self._remaining.get(spec.trial, 0) + 1
+        self._is_due = rule is not None  # the results of an earlier run may already be sufficient
+        self._next_time = 0.0
+
+    def ended(self, spec: EpisodeSpec) -> None:
+        """Counts an ended episode."""
+        self._remaining[spec.trial] -= 1
+        self._is_due = self._is_due or self._remaining[spec.trial] == 0
+
+    def reason_to_stop(self) -> str:
+        """Applies the rule if a trial has ended since the last call and the pause has passed.
+
+        Returns:
+            Reason to stop the experiment; "" to continue.
+        """
+        if self._rule is None or not self._is_due or time.monotonic() < self._next_time:
+            return ""
+        start = time.monotonic()
+        decision = self._rule.decide(self._load())
+        end = time.monotonic()
+        self._is_due, self._next_time = False, end + PAUSE_FACTOR * (end - start)
+        return decision.reason if decision.stop else ""
+
+
+class EpisodeQueue:
+    """Queue of the remaining episodes.
+
+    Args:
+        episodes: Episodes in the order of the run.
+    """
+
+    def __init__(self, episodes: Iterable[EpisodeSpec]) -> None:
+        self._groups: list[tuple[str, deque[EpisodeSpec]]] = []
+        for spec in episodes:
+            stack = stack_of(spec.settings)
+            if not self._groups or self._groups[-1][0] != stack:
+                self._groups.append((stack, deque()))
+            self._groups[-1][1].append(spec)
+        self._groups.reverse()  # pop() removes the last element in constant time
+        self._owned: dict[str, deque[EpisodeSpec]] = {}
+        self._running: dict[str, str] = {}  # stack of each slot's latest episode
+
+    def __len__(self) -> int:
+        return sum(len(group) for _, group in self._groups) + sum(len(group) for group in self._owned.values())
+
+    def next_for(self, slot: str, alone: bool = False) -> EpisodeSpec | None:
+        """Returns the next episode for a slot, or None without an episode for it.
+
+        A slot runs the episodes of one stack, then those of the next unassigned stack. Without an unassigned stack, it
+        helps the slot with most remaining episodes. It leaves that slot the last episode if it would have to start
+        another stack for it.
+
+        Args:
+            slot: Name of the slot.
+            alone: Whether no other slot runs an episode, so that this slot takes any remaining episode.
+        """
+        own = self._owned.get(slot)
+        if not own and self._groups:
+            own = self._owned[slot] = self._groups.pop()[1]
+        if not own:
+            own = max(self._owned.values(), key=len, default=None)
+            if not own or (len(own) == 1 and not alone and self._running.get(slot) != stack_of(own[0].settings)):
+                return None
+        spec = own.popleft()
+        self._running[slot] = stack_of(spec.settings)
+        return spec
+
 
 if TYPE_CHECKING:
     from modular_framework_benchmark.statistics.stopping import StoppingRule

@@ -7,6 +7,7 @@ roslaunch itself always exits with 0, but scripts need the result of the task.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +24,6 @@ import roslaunch.rlutil
 import rospkg
 
 from modular_framework_core.launching.launch_arguments import argument_values, check_arguments
-from modular_framework_core.launching.launch_causes import cause_of_death
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
@@ -200,3 +200,25 @@ def verdict(watcher: EndWatcher, cause: str) -> int:
     failed = watcher.task_exit_code != 0
     print(f"run_framework: {result}{because if failed else ''}", file=sys.stderr if failed else sys.stdout, flush=True)
     return watcher.task_exit_code
+
+
+_RECORD = re.compile(r"^\[[\w.]+\]\[(\w+)\] [\d-]+ [\d:,]+: ")
+
+
+def cause_of_death(log_file: Path) -> str:
+    """Returns the last fatal message in a log file of rospy, or "" without a message or file."""
+    try:
+        lines = log_file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    message: list[str] = []
+    in_fatal = False
+    for line in lines:
+        record = _RECORD.match(line)
+        if record is not None:
+            in_fatal = record[1] == "CRITICAL"
+            if in_fatal:
+                message = []
+        if in_fatal:
+            message.append(line[record.end() :] if record is not None else line)
+    return "\n".join(message).strip()
