@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
-from modular_framework_benchmark.experiments.ros_move_group_names import (
+from modular_framework_benchmark.experiments.ros_pipeline_names import (
     DETECTOR,
     MANAGER,
+    PipelineNames,
     move_group_faults,
     resolved_names,
+    unknown_name,
 )
-from modular_framework_benchmark.experiments.ros_pipeline_names import PipelineNames, unknown_name
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
 from modular_framework_benchmark.experiments.ros_task_check import CacheableNames, checked_task
 from modular_framework_core.launching.launch_values import CONFIGURATION

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Map
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.distributions import (
@@ -16,12 +17,17 @@ from modular_framework_benchmark.experiments.distributions import (
 )
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
-from modular_framework_benchmark.experiments.resting_height import lowest_point, resting_height
 from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
 from modular_framework_core.files.located_yaml import Sequence as ListNode
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.model_extents import reach
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources, no_packages
+from modular_framework_urdf.rotations import rotate_vector
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 SURFACE, OLD_SURFACE = "rests_at", "on"
@@ -182,3 +188,55 @@ def placed_objects(
             continue
         objects.append(_named_object(item, file, taken, reading))
     return objects
+
+
+GAP_M = 0.001
+"""Clearance between an object and its surface, so that they are not in contact at the start [m]."""
+
+
+def resting_height(model: Path, surface_m: float, roll_rad: float, pitch_rad: float) -> float:
+    """Returns the height of the model frame at which the model stands on a surface [m].
+
+    Args:
+        model: SDF file of the model.
+        surface_m: Height of the horizontal surface [m].
+        roll_rad: Roll angle of the model [rad].
+        pitch_rad: Pitch angle of the model [rad].
+
+    Raises:
+        DescriptionError: The file is invalid, or has no collision shape.
+    """
+    return round(surface_m + GAP_M - lowest_point(model, roll_rad, pitch_rad), 6)
+
+
+@lru_cache(maxsize=4096)
+def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
+    """Returns the height of the lowest point of a model's collision shapes relative to its frame [m].
+
+    Args:
+        model: SDF file of the model.
+        roll_rad: Roll angle of the model [rad].
+        pitch_rad: Pitch angle of the model [rad].
+
+    Raises:
+        DescriptionError: See `resting_height`.
+    """
+    spec = _read(model)
+    shapes = [collision.geometry for link in spec.links for collision in link.collisions]
+    if not shapes:
+        raise DescriptionError(str(model), "got no <collision>", "allowed: a model with one; give z instead of on")
+    if any(isinstance(shape, specs.Plane) for shape in shapes):
+        raise DescriptionError("<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on")
+    to_model = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0)).inverse()
+    return -reach(spec, rotate_vector(to_model.quaternion, (0.0, 0.0, -1.0)))
+
+
+@lru_cache(maxsize=64)
+def _read(model: Path) -> specs.Model:
+    try:
+        text = model.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(
+            str(model), f"got a file that cannot be read ({error})", "allowed: an SDF file"
+        ) from error
+    return read_model_text(text, str(model), Resources((model.parent.parent,), no_packages))

@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import load_mesh
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_world import ContactPoint, PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import add, cross
-from modular_framework_simulation.sensors.nearest_shape import nearest_shape
 from modular_framework_simulation.sensors.sensor_xml import LinkShapes, Sensor, SensorXml, resolved
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
@@ -192,3 +197,47 @@ def _measured_contact(point: ContactPoint, centre: Vector3, to_frame: Pose) -> M
         rotate_vector(to_frame.quaternion, each) for each in (point.normal, point.force, cross(arm, point.force))
     ]
     return MeasuredContact((to_frame @ Pose(point.position)).position, rotated[0], point.depth, rotated[1], rotated[2])
+
+
+def nearest_shape(posed_shapes: Sequence[tuple[Pose, specs.Geometry]], point: Vector3) -> int:
+    """Returns the index of the shape whose surface is nearest to a point; the bounding box represents a mesh.
+
+    Args:
+        posed_shapes: Shapes with their poses in the world frame.
+        point: Point in the world frame [m].
+    """
+    distances = [abs(_distance(shape, (pose.inverse() @ Pose(point)).position)) for pose, shape in posed_shapes]
+    return distances.index(min(distances))
+
+
+def _distance(shape: specs.Geometry, point: Vector3) -> float:
+    """Returns the signed distance of a point to the surface of a shape [m], negative inside the shape.
+
+    Args:
+        shape: The shape.
+        point: Point in the frame of the shape [m].
+    """
+    x, y, z = point
+    match shape:
+        case specs.Box(size=(a, b, c)):
+            return _box_distance((abs(x) - a / 2, abs(y) - b / 2, abs(z) - c / 2))
+        case specs.Cylinder(radius=radius, length=length):
+            return _box_distance((math.hypot(x, y) - radius, abs(z) - length / 2))
+        case specs.Sphere(radius=radius):
+            return math.hypot(x, y, z) - radius
+        case specs.Plane(normal=(a, b, c)):
+            return a * x + b * y + c * z
+        case specs.Mesh():
+            low, high = _bounds(shape)
+            return _box_distance(tuple(max(p - b, a - p) for p, a, b in zip(point, low, high, strict=True)))
+
+
+def _box_distance(face_distances: Sequence[float]) -> float:
+    """Returns the signed distance to a box from the signed distances to its faces along each axis."""
+    return math.hypot(*(max(each, 0.0) for each in face_distances)) + min(max(face_distances), 0.0)
+
+
+@functools.lru_cache(maxsize=256)
+def _bounds(mesh: specs.Mesh) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    vertices = np.asarray(load_mesh(mesh).vertices)
+    return tuple(vertices.min(axis=0).tolist()), tuple(vertices.max(axis=0).tolist())

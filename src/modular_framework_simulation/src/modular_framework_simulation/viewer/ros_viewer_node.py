@@ -29,8 +29,7 @@ from modular_framework_simulation.viewer.plan_playback import plan_of
 from modular_framework_simulation.viewer.planning_scene_view import PlanningSceneView
 from modular_framework_simulation.viewer.robot_links import finite_positions
 from modular_framework_simulation.viewer.robot_view import PlanView, RobotView
-from modular_framework_simulation.viewer.ros_base_pose import BasePose
-from modular_framework_simulation.viewer.ros_feed import Feed
+from modular_framework_simulation.viewer.ros_feed import BasePose, Feed
 from modular_framework_simulation.viewer.ros_gazebo_commands import GazeboCommands
 from modular_framework_simulation.viewer.web_server import WebServer, free_port
 from modular_framework_simulation.viewer.world_view import RealTimeFactor, WorldView
