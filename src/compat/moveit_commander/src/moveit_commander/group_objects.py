@@ -87,16 +87,10 @@ class GroupObjects(GroupMotion):
             grasps = self._planned_grasps(object_name)
         goal = PickupGoal(
             target_name=object_name,
-            group_name=self._group.name,
             end_effector=self._group.end_effector,
             possible_grasps=grasps,
-            support_surface_name=self._support_surface,
-            allow_gripper_support_collision=bool(self._support_surface),
-            path_constraints=self._path_constraints,
-            planner_id=self._planner_id,
-            allowed_planning_time=self._planning_time_s,
-            planning_options=self._options(plan_only),
         )
+        self._fill_settings(goal, plan_only)
         code = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S).error_code
         self._check_result(code, "pick")
         return int(code.val)
@@ -114,19 +108,20 @@ class GroupObjects(GroupMotion):
             MoveItCommanderException: The location has an unsupported type.
         """
         goal = PlaceGoal(
-            group_name=self._group.name,
             attached_object_name=object_name,
             place_locations=self._place_locations(location),
-            support_surface_name=self._support_surface,
-            path_constraints=self._path_constraints,
-            allow_gripper_support_collision=bool(self._support_surface),
-            planner_id=self._planner_id,
-            allowed_planning_time=self._planning_time_s,
-            planning_options=self._options(plan_only),
         )
+        self._fill_settings(goal, plan_only)
         caller = self._servers.action("place", PlaceAction)
         result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
         return self._check_result(result.error_code, "place")
+
+    def _fill_settings(self, goal: PickupGoal | PlaceGoal, plan_only: bool) -> None:
+        goal.group_name = self._group.name
+        goal.support_surface_name = self._support_surface
+        goal.allow_gripper_support_collision = bool(self._support_surface)
+        goal.path_constraints, goal.planning_options = self._path_constraints, self._options(plan_only)
+        goal.planner_id, goal.allowed_planning_time = self._planner_id, self._planning_time_s
 
     def _place_locations(self, location: Any) -> list[PlaceLocation]:
         given = location if isinstance(location, list) else [] if location is None else [location]
