@@ -6,7 +6,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", 
     factors = np.array(scale, dtype=float)
     if factors.shape != (3,) or not np.isfinite(factors).all() or not factors.all():
         raise MeshError(path, f"scale is {list(scale)}", "allowed: three finite numbers, none of them 0")
-    declared, unit, vertices, triangles = _read(path, part)
+    declared, unit, (vertices, triangles) = _read(path, part)
     if len(triangles) != declared:
         raise MeshError(
             path,
@@ -93,8 +93,15 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", 
     return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
 
 
-def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64]]:
-    """Returns declared number of triangles, unit [m], vertices and triangles of a file."""
+class _Content(NamedTuple):
+    """Declared number of triangles, unit [m], and vertices with triangles of a file."""
+
+    declared: int
+    unit: float
+    mesh: tuple[NDArray[np.float64], NDArray[np.int64]]
+
+
+def _read(path: Path, part: str) -> _Content:
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ALLOWED:
         raise MeshError(path, f"is a '{path.suffix}' file", f"allowed: {', '.join(ALLOWED)}; convert the mesh")
@@ -104,7 +111,7 @@ def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArr
             root = collada.parse(content, path.name)
             if part:
                 _require_part(path, part, collada.keep_part(root, part))
-            return collada.triangles(root), collada.unit(root), *_load("dae", collada.without_materials(root))
+            return _Content(collada.triangles(root), collada.unit(root), _load("dae", collada.without_materials(root)))
         if part:
             if kind != "obj":
                 raise MeshError(path, f"has no part '{part}'", "allowed: parts of dae and obj files")
@@ -112,8 +119,9 @@ def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArr
             _require_part(path, part, names)
         declared = declared_triangles(kind, content)
         if kind == "stl" and is_binary_stl(content):  # the common case needs no trimesh, whose import takes 0.6 s
-            return declared, 1.0, *_corners(np.frombuffer(content, BINARY_STL, offset=STL_HEADER)["corners"])
-        return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)
+            corners = np.frombuffer(content, BINARY_STL, offset=STL_HEADER)["corners"]
+            return _Content(declared, 1.0, _corners(corners))
+        return _Content(declared, 1.0, _load(kind, with_absolute_indices(content) if kind == "obj" else content))
     except MeshError:
         raise
     except OSError as error:

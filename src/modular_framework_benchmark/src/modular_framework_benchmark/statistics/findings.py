@@ -87,15 +87,11 @@ def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Findin
     finding = replace(empty, counts=_counts(matched, outcomes, len(means)))
     if not len(matched):
         return finding
-    p_value, test, interval = _test(means, sizes, settings)
     finding = replace(
-        finding,
+        _tested(finding, means, sizes, settings),
         first_estimate=_point_estimate(matched.first.scores, metric),
         second_estimate=_point_estimate(matched.second.scores, metric),
-        difference=Estimate("win difference", float(np.mean(means)), interval),
         mean_difference=_mean_difference(matched, metric, settings),
-        p_value=p_value,
-        test=test,
         discordance=float(np.mean(means**2)),
         min_attainable_p=0.0 if settings.at_any_time else 2.0 ** (1.0 - np.count_nonzero(means)),
     )
@@ -125,18 +121,24 @@ def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
     )
 
 
-def _test(means: Floats, sizes: Integers, settings: Settings) -> tuple[float | None, str, Interval | None]:
-    """Returns the p value, the test's name and the interval of the mean win difference over the units."""
+def _tested(finding: Finding, means: Floats, sizes: Integers, settings: Settings) -> Finding:
+    """Returns the finding with the mean win difference over the units and its test."""
+    p_value: float | None = None
+    interval: Interval | None = None
     if len(means) < MIN_UNITS:
-        return None, f"none: fewer than {MIN_UNITS} units", None
-    if settings.at_any_time:
-        p_value = sequential.anytime_p_value(means)
-        return p_value, "betting test, valid at any time", sequential.anytime_interval(means, settings.confidence)
-    if np.isin(means, (-1.0, 0.0, 1.0)).all():
+        test = f"none: fewer than {MIN_UNITS} units"
+    elif settings.at_any_time:
+        test, p_value = "betting test, valid at any time", sequential.anytime_p_value(means)
+        interval = sequential.anytime_interval(means, settings.confidence)
+    elif np.isin(means, (-1.0, 0.0, 1.0)).all():
         pairs = rates.PairOutcomes(int(np.sum(means > 0)), int(np.sum(means < 0)), len(means))
-        return rates.paired_p_value(pairs), "McNemar's exact test", rates.paired_interval(pairs, settings.confidence)
-    interval = bounded_mean_interval(means, (-1.0, 1.0), settings.confidence)
-    return sign_flip_p_value(means, sizes), "sign flip test of the units", interval
+        test, p_value = "McNemar's exact test", rates.paired_p_value(pairs)
+        interval = rates.paired_interval(pairs, settings.confidence)
+    else:
+        test, p_value = "sign flip test of the units", sign_flip_p_value(means, sizes)
+        interval = bounded_mean_interval(means, (-1.0, 1.0), settings.confidence)
+    difference = Estimate("win difference", float(np.mean(means)), interval)
+    return replace(finding, difference=difference, p_value=p_value, test=test)
 
 
 def _point_estimate(scores: Floats, metric: Metric) -> float:

@@ -27,6 +27,9 @@ class _Part:
     tensor: Array
 
 
+_EMPTY = _Part(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
 def inertial_of_shapes(shapes: list[tuple[specs.Collision, float]]) -> specs.Inertial | None:
     """Computes the mass properties of filled shapes; overlapping volumes are counted repeatedly.
 
@@ -97,30 +100,31 @@ def _upper_triangle(tensor: Array) -> tuple[float, float, float, float, float, f
 
 
 def _part(shape: specs.Collision, density: float) -> _Part:
-    volume, centre, per_mass = _solid(shape.geometry)
+    solid = _solid(shape.geometry)
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rotation = np.array([rotate_vector(shape.pose.quaternion, axis) for axis in axes]).T
-    mass = volume * density
-    return _Part(mass, np.array(shape.pose.position) + rotation @ centre, mass * rotation @ per_mass @ rotation.T)
+    centre = np.array(shape.pose.position) + rotation @ solid.centre
+    return _Part(solid.mass * density, centre, density * rotation @ solid.tensor @ rotation.T)
 
 
-def _solid(geometry: specs.Geometry) -> tuple[float, Array, Array]:
-    """Returns volume [m^3], centre [m] and moments about the centre per mass [m^2], in the frame of the shape."""
+def _solid(geometry: specs.Geometry) -> _Part:
+    """Returns a shape with a density of 1 kg/m^3, in the frame of the shape."""
     match geometry:
         case specs.Box(size=(x, y, z)):
-            moments = np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
-            return x * y * z, np.zeros(3), moments
+            volume, moments = x * y * z, np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
         case specs.Cylinder(radius=radius, length=length):
             across = (3 * radius**2 + length**2) / 12
-            return math.pi * radius**2 * length, np.zeros(3), np.diag([across, across, radius**2 / 2])
+            volume, moments = math.pi * radius**2 * length, np.diag([across, across, radius**2 / 2])
         case specs.Sphere(radius=radius):
-            return 4 / 3 * math.pi * radius**3, np.zeros(3), np.eye(3) * 0.4 * radius**2
+            volume, moments = 4 / 3 * math.pi * radius**3, np.eye(3) * 0.4 * radius**2
         case specs.Mesh():
             return _solid_mesh(geometry)
-    raise ValueError(f"{type(geometry).__name__} has no volume")
+        case _:
+            raise ValueError(f"{type(geometry).__name__} has no volume")
+    return _Part(volume, np.zeros(3), volume * moments)
 
 
-def _solid_mesh(mesh: specs.Mesh) -> tuple[float, Array, Array]:
+def _solid_mesh(mesh: specs.Mesh) -> _Part:
     import trimesh
 
     loaded = load_mesh(mesh)
@@ -129,8 +133,6 @@ def _solid_mesh(mesh: specs.Mesh) -> tuple[float, Array, Array]:
         try:
             solid = solid.convex_hull
         except Exception:  # noqa: BLE001 - qhull reports flat point sets with its own exceptions
-            return 0.0, np.zeros(3), np.zeros((3, 3))
+            return _EMPTY
     volume = float(solid.volume)
-    if volume <= 0:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
-    return volume, np.asarray(solid.center_mass), np.asarray(solid.moment_inertia) / volume
+    return _Part(volume, np.asarray(solid.center_mass), np.asarray(solid.moment_inertia)) if volume > 0 else _EMPTY

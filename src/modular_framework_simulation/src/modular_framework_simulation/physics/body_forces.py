@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -81,6 +81,15 @@ class _Spring:
         self.engine.apply_effort(self.body.number, index, force)
 
 
+class _CentreMotion(NamedTuple):
+    """Position, axes (columns), velocity and angular velocity of a centre of mass, in the world frame."""
+
+    position: Vector3
+    axes: np.ndarray
+    linear: np.ndarray
+    angular: np.ndarray
+
+
 class _LinkForce:
     """Mass and motion of the link that a force acts on."""
 
@@ -89,15 +98,15 @@ class _LinkForce:
         properties = engine.mass_properties(body.number, index)
         self._mass, self._moments = float(properties.mass), np.array(properties.moments)
 
-    def _motion(self) -> tuple[Vector3, np.ndarray, np.ndarray, np.ndarray]:
-        """Returns position, axes, velocity and angular velocity of the centre of mass, in the world frame."""
+    def _motion(self) -> _CentreMotion:
         number = self._body.number
         if self._index == BASE_INDEX:
             centre = self._engine.base_centre(number)
             linear, angular = self._engine.base_twist(number)
         else:
             centre, _, linear, angular = self._engine.link_motion(number, self._index)
-        return centre.position, _rotation_matrix(centre.quaternion), np.array(linear), np.array(angular)
+        axes = _rotation_matrix(centre.quaternion)
+        return _CentreMotion(centre.position, axes, np.array(linear), np.array(angular))
 
     def _apply_force(self, position: Vector3, force: np.ndarray) -> None:
         self._engine.apply_force(self._body.number, self._index, force.tolist(), position)
@@ -137,8 +146,7 @@ class _Buoyancy(_LinkForce):
 
     def apply(self, gravity: Vector3) -> None:
         """Applies the force against gravity."""
-        position, *_ = self._motion()
-        self._apply_force(position, -self._mass * np.array(gravity))
+        self._apply_force(self._motion().position, -self._mass * np.array(gravity))
 
 
 def _rotation_matrix(quaternion: Quaternion) -> np.ndarray:

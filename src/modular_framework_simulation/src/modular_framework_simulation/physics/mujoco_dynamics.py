@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -63,6 +64,28 @@ class SavedDynamics:
     by_dof: tuple[Array, ...]
 
 
+class Contacts(NamedTuple):
+    """Contacts of a step.
+
+    Attributes:
+        bodies: Ids of both bodies, shape (n, 2).
+        forces: Normal forces, shape (n,) [N].
+        distances: Distances, shape (n,) [m].
+    """
+
+    bodies: Indices
+    forces: Array
+    distances: Array
+
+
+class ContactForce(NamedTuple):
+    """Position of a contact [m], and normal and force [N] on its second body."""
+
+    position: Vector3
+    normal: Array
+    force: Array
+
+
 class MujocoDynamics:
     """State of a MuJoCo model in motion.
 
@@ -93,7 +116,7 @@ class MujocoDynamics:
         single = np.isin(model.jnt_type, _SINGLE)
         self._single_dofs, self._single_positions = model.jnt_dofadr[single], model.jnt_qposadr[single]
         self._outdated = True
-        self._contacts: tuple[Indices, Array, Array] | None = None
+        self._contacts: Contacts | None = None
 
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
         """Changes settings and gravity [m/s^2]."""
@@ -151,26 +174,26 @@ class MujocoDynamics:
         if not math.isfinite(float(data.qvel.sum())):
             raise SimulationError("the velocities of the physics engine mujoco are no longer finite")
 
-    def contacts(self) -> tuple[Indices, Array, Array]:
-        """Returns the contacts of the last step: body ids, normal forces [N] and distances [m]."""
+    def contacts(self) -> Contacts:
+        """Returns the contacts of the last step."""
         if self._contacts is None:
             contact, data = self.data.contact, self.data
             if data.ncon == 0:
-                self._contacts = np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0)
+                self._contacts = Contacts(np.zeros((0, 2), dtype=np.int64), np.zeros(0), np.zeros(0))
             else:
                 rows = np.array(contact.efc_address)
                 forces = np.where(rows >= 0, data.efc_force[np.maximum(rows, 0)], 0.0) if data.nefc else 0.0 * rows
-                self._contacts = self.model.geom_bodyid[contact.geom], forces, np.array(contact.dist)
+                self._contacts = Contacts(self.model.geom_bodyid[contact.geom], forces, np.array(contact.dist))
         return self._contacts
 
-    def contact(self, row: int) -> tuple[Vector3, Array, Array]:
-        """Returns a contact of the last step: position [m], and normal and force [N] on its second body."""
+    def contact(self, row: int) -> ContactForce:
+        """Returns a contact of the last step."""
         contact = self.data.contact[row]
         force = np.zeros(6)
         mujoco.mj_contactForce(self.model, self.data, row, force)
         axes = contact.frame.reshape(3, 3)
         x, y, z = contact.pos.tolist()
-        return (x, y, z), axes[0], force[:3] @ axes
+        return ContactForce((x, y, z), axes[0], force[:3] @ axes)
 
     def _set_frictions(self) -> None:
         """Sets the friction of contacts: the smaller sliding coefficients, and combined spinning and rolling terms.

@@ -14,7 +14,7 @@ import numpy as np
 
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.simulated_body import twist_at
+from modular_framework_simulation.physics.simulated_body import BodyState, twist_at
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
 from modular_framework_simulation.sensors.sensor_xml import Sensor, SensorXml, prefixed, resolved, slower_of
 from modular_framework_urdf.rotations import Quaternion, Vector3, multiply_quaternions, rotate_vector
@@ -168,33 +168,31 @@ class Imu:
         channels = (*sensor.rate_noise, *sensor.acceleration_noise, *(sensor.orientation_noise,) * 4)
         self._noise = NoiseSource(seed, sensor.name, channels)
         self._previous: tuple[int, Vector3] | None = None
-        pose, _, _ = self._motion()
-        self._initial = pose.quaternion
+        self._initial = self._motion().pose.quaternion
 
     def reset(self) -> None:
         """Discards the last measurement; the next call of `measure` starts again."""
         self._previous = None
 
-    def _motion(self) -> tuple[Pose, Vector3, Vector3]:
-        """Returns the pose, the linear velocity and the angular velocity of the sensor in the world frame."""
+    def _motion(self) -> BodyState:
+        """Returns the motion of the sensor in the world frame."""
         state = self._world.entity_state(self._sensor.parent)
         pose = state.pose @ self._sensor.pose
-        twist = twist_at(state.twist, state.pose, pose)
-        return pose, twist.linear, twist.angular
+        return BodyState(pose, twist_at(state.twist, state.pose, pose))
 
     def measure(self) -> ImuReading | None:
         """Returns the current measurement; None for the first call, because a previous velocity is missing."""
-        pose, linear, angular = self._motion()
+        motion = self._motion()
         now_ns, previous = self._world.time_ns, self._previous
-        self._previous = (now_ns, linear)
+        self._previous = (now_ns, motion.twist.linear)
         if previous is None or previous[0] >= now_ns:
             return None
         elapsed_s = (now_ns - previous[0]) * 1e-9
-        change = zip(linear, previous[1], self._world.gravity, strict=True)
+        change = zip(motion.twist.linear, previous[1], self._world.gravity, strict=True)
         x, y, z = ((after - earlier) / elapsed_s - gravity for after, earlier, gravity in change)
-        to_sensor = pose.inverse().quaternion
-        rate, force = rotate_vector(to_sensor, angular), rotate_vector(to_sensor, (x, y, z))
-        return self._noisy(ImuReading(self._orientation(pose), rate, force), now_ns)
+        to_sensor = motion.pose.inverse().quaternion
+        rate, force = rotate_vector(to_sensor, motion.twist.angular), rotate_vector(to_sensor, (x, y, z))
+        return self._noisy(ImuReading(self._orientation(motion.pose), rate, force), now_ns)
 
     def _orientation(self, pose: Pose) -> Quaternion:
         orientation = pose.quaternion
