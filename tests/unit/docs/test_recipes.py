@@ -102,7 +102,7 @@ from conftest import Loop
 
 from modular_framework_control.hardware_interface.interfaces import JointStateInterface
 
-half = {{"type": "position_controllers/HalfWayController", "joint": "a", "goal": 0.8}}
+half = {{"type": "modular_framework_control/HalfWayController", "joint": "a", "goal": 0.8}}
 loop = Loop({{"hw": {{"joints": ["a"]}}, "half": half, "misspelt": {{**half, "gaol": 0.5}}}})
 loop.manager.load_controller("half")
 loop.manager.load_controller("misspelt")
@@ -116,17 +116,10 @@ print(loop.robot_hw.get(JointStateInterface).get_handle("a").position)
 def test_a_controller(tmp_path: Path) -> None:
     recipe = Recipe("A controller", "modular_framework_control", tmp_path)
     recipe.create(f"{CONTROL}/controllers", "half_way_controller.py", HALF_WAY)
-    name = '    "position_controllers/HalfWayController": '
-    manager = f"{CONTROL}/controller_manager"
     recipe.insert(
-        f"{manager}/controller_types.py",
+        f"{CONTROL}/controller_manager/controller_types.py",
         '    "joint_state_controller/JointStateController"',
-        name + 'f"{_CONTROLLERS}.half_way_controller:HalfWayController",\n',
-    )
-    recipe.insert(
-        f"{manager}/controller_parameters.py",
-        '    "joint_state_controller/JointStateController"',
-        name + '"HalfWayController",\n',
+        '    "modular_framework_control/HalfWayController": f"{_CONTROLLERS}.half_way_controller:HalfWayController",\n',
     )
     recipe.create(
         "src/modular_framework_control/parameters",

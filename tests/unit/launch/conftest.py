@@ -2,7 +2,6 @@
 """Runs launch descriptions in this process, and launch files with the command, on a master of their own."""
 
 import os
-import socket
 import subprocess
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -11,14 +10,9 @@ import pytest
 from launch import LaunchDescription, LaunchService
 from launch.actions import OpaqueFunction, SetLaunchConfiguration
 
+from modular_framework_core.launching.launch_session import free_port
+
 COMMAND = Path(__file__).parents[3] / "src" / "compat" / "launch" / "scripts" / "launch_py"
-
-
-def free_port() -> int:
-    """Answers a TCP port of the loopback interface that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -23,12 +24,20 @@ STOP_TIMEOUT_S = 15.0
 KILL_POLL_S = 0.01
 """Polling period for remaining processes [s]."""
 
+PORTS = range(12000, 32000)
+"""Ports of masters, below those that Linux assigns by default."""
+
 
 def free_port() -> int:
-    """Returns a free TCP port of the loopback interface."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Returns a free TCP port of the loopback interface.
+
+    The system assigns no port of `PORTS` by itself, so no node that starts meanwhile gets the port.
+    """
+    for port in random.SystemRandom().sample(PORTS, len(PORTS)):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise OSError(f"all ports from {PORTS[0]} to {PORTS[-1]} are in use")
 
 
 def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]:
