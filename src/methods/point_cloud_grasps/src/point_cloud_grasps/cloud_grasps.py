@@ -4,8 +4,7 @@
 The planning scene gives only the search region: the name, position and approximate size of the object. Its shape comes
 from the cloud (:mod:`segmentation`, :mod:`seen_shape`). Contact pairs are sampled from that shape
 (:mod:`cloud_pairs`), at most half a pad height below the visible surface. The shape further below is unknown. The hand
-avoids the other
-points of the cloud as well as the objects of the planning scene.
+avoids the other points of the cloud as well as the objects of the planning scene.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 """Margins between the robot and the world: MoveIt's link padding and link scale.
 
 Padding does not change shapes; padding is the minimum distance between two bodies: a link and a world object count as
-touching when
-closer than the margin. The result equals the exact Minkowski sum of the shape and a sphere, also for meshes.
-As in MoveIt, pairs of links are never padded.
+touching when closer than the margin. The result equals the exact Minkowski sum of the shape and a sphere, also for
+meshes. As in MoveIt, pairs of links are never padded.
 """
 
 from __future__ import annotations

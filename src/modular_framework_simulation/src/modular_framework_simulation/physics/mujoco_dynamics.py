@@ -3,14 +3,13 @@
 
 MuJoCo solves for accelerations as close to reference accelerations as the bounds of the forces allow. For a contact or
 a joint with dry friction, the reference acceleration stops the motion. Between MuJoCo's own functions, `step` changes
-the
-following:
+the following:
 
 - A contact uses the smaller coefficients of its two surfaces (MuJoCo uses the larger coefficients).
 - Every reference is reached within one step, except the fraction of penetrations given by `PhysicsSettings`.
 - Bouncing surfaces have a reference velocity in proportion to the impact velocity (MuJoCo has no restitution).
 - A motor is modelled as dry friction relative to its target velocity, so that its effort limit is exact and the solver
-handles motors and contacts together.
+  handles motors and contacts together.
 """
 
 from __future__ import annotations

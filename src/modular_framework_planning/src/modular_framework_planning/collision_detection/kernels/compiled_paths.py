@@ -2,9 +2,8 @@
 """Compiled collision checks of whole paths: the clearance at one state certifies a section of the path.
 
 If two bodies have clearance c at a state, the pair cannot collide until the bodies move by c relative to each other.
-The
-motion of a body is bounded by the sum over joints of joint motion times the body's distance from the joint axis. Only
-evaluated samples are computed, so that a fine step costs no more than a coarse step far from obstacles.
+The motion of a body is bounded by the sum over joints of joint motion times the body's distance from the joint axis.
+Only evaluated samples are computed, so that a fine step costs no more than a coarse step far from obstacles.
 """
 
 from __future__ import annotations
