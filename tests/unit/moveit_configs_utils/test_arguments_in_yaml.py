@@ -55,7 +55,7 @@ def test_an_argument_without_a_value_stays_with_a_warning(
     launch_files = [name for name in FILES if name.startswith("launch/")]
     folder = make_package(FILES, without=launch_files)
     assert names(MoveItConfigsBuilder("r")) == expected("$(arg arm_id)")
-    assert f"{folder}/config/kinematics.yaml: no value for $(arg arm_id) (looked in" in caplog.text
+    assert f"{folder}/config/kinematics.yaml: no value for $(arg arm_id) (xacro arguments" in caplog.text
 
 
 def test_a_launch_file_that_is_no_xml_is_a_warning(
