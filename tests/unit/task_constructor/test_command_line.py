@@ -203,7 +203,10 @@ def test_a_configuration_that_is_not_there_is_refused_and_not_left_unchecked(
 def test_a_task_that_is_not_there_is_named_with_those_that_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--check", "simulation_pik.yaml"]) == 1
     message = capsys.readouterr().err
-    assert "there is no such file; allowed: pick_and_hold.yaml, pick_and_place.yaml, simulation_pick.yaml; did you mean" in message
+    assert (
+        "there is no such file; allowed: pick_and_hold.yaml, pick_and_place.yaml, simulation_pick.yaml; did you mean"
+        in message
+    )
 
 
 def test_several_directories_are_separated_by_colons() -> None:
