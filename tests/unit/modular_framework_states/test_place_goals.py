@@ -14,7 +14,7 @@ from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningSc
 from scipy.spatial.transform import Rotation
 from shape_msgs.msg import SolidPrimitive
 
-from modular_framework_states import place_goals
+from modular_framework_states import link_poses, place_goals
 from modular_framework_states.place_goals import place_locations, read_place_scene
 from modular_framework_states.place_poses import PlaceError, PlacePose
 
@@ -60,7 +60,8 @@ def scene(monkeypatch: pytest.MonkeyPatch) -> PlanningScene:
         stamped[0].header.frame_id = "world"
         return SimpleNamespace(pose_stamped=stamped)
 
-    monkeypatch.setattr(place_goals, "request_service", request_service)
+    for module in (place_goals, link_poses):
+        monkeypatch.setattr(module, "request_service", request_service)
     return message
 
 

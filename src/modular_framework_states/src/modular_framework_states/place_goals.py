@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3, Vector3Stamped
 from moveit_msgs.msg import CollisionObject, GripperTranslation, PlaceLocation, PlanningSceneComponents
-from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest, GetPositionFK, GetPositionFKRequest
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from modular_framework_core.commander.moveit_requests import error_name, robot_state
 from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.grasp_generation.planning_scene_objects import rotation_matrix, scene_object
 from modular_framework_ros.allowed_names import listing, nearest
-from modular_framework_ros.calls import CallError, request_service
+from modular_framework_ros.calls import request_service
 from modular_framework_states.grasp_stages import stage_pose
+from modular_framework_states.link_poses import link_poses
 from modular_framework_states.place_poses import Array, PlaceError, PlacePose
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
@@ -83,11 +83,11 @@ def read_place_scene(commander: Any, grasp: Any, support: str) -> PlaceScene:
         raise PlaceError(f"the hand should hold {what}; attached objects: {', '.join(there) or 'none'}")
     found = _only(support, scene.world.collision_objects)
     tip_link, item = commander.group.tip_link, held[0].object
-    frame, tip, carrier = _link_poses(commander, tip_link, item.header.frame_id)
-    in_tip = _rotation(tip).inv() * _rotation(carrier) * _rotation(item.pose)
+    tip, carrier = link_poses(commander, (tip_link, item.header.frame_id), SERVICE_TIMEOUT_S)
+    in_tip = _rotation(tip.pose).inv() * _rotation(carrier.pose) * _rotation(item.pose)
     grasped, before = (stage_pose(grasp, stage).pose for stage in ("grasp", "pregrasp"))
     return PlaceScene(
-        frame=frame,
+        frame=tip.header.frame_id,
         held=item.id,
         solids=_solids(item, in_own_frame=True),
         orientation=_rotation(grasped) * in_tip,
@@ -107,17 +107,6 @@ def _only(support: str, objects: Sequence[CollisionObject]) -> CollisionObject:
             f"{nearest(support, known)}"
         )
     return found[0]
-
-
-def _link_poses(commander: Any, *links: str) -> tuple[Any, ...]:
-    """Returns the planning frame and the poses of links in the current state."""
-    request = GetPositionFKRequest(fk_link_names=links, robot_state=robot_state(commander.current_joints()))
-    response = request_service("compute_fk", GetPositionFK, request, SERVICE_TIMEOUT_S)
-    if len(response.pose_stamped) != len(links):
-        raise CallError(
-            f"'compute_fk' did not return the poses of {', '.join(links)}: {error_name(response.error_code.val)}"
-        )
-    return response.pose_stamped[0].header.frame_id, *(item.pose for item in response.pose_stamped)
 
 
 def _rotation(pose: Any) -> Rotation:

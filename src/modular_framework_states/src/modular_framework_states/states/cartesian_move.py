@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Unpack
 
 import numpy as np
-import rospy
 from geometry_msgs.msg import Pose, PoseStamped
-from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest, GetPositionFK, GetPositionFKRequest
+from moveit_msgs.srv import GetCartesianPath, GetCartesianPathRequest
 from scipy.spatial.transform import Rotation
 
 from modular_framework_core.commander.moveit_requests import error_name, robot_state
@@ -18,6 +17,7 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits, Share, Vector
 from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, request_service
+from modular_framework_states.link_poses import link_poses
 from modular_framework_states.manager_clients import ManagerError, fetch
 
 TIMEOUT_S = 20.0
@@ -83,15 +83,8 @@ class CartesianMove(FrameworkState):
     def _target(self, commander: Any) -> PoseStamped:
         if self._offset is None:
             return fetch("pose", self._pose_name)
-        link = commander.group.tip_link
-        request = GetPositionFKRequest(fk_link_names=[link], robot_state=robot_state(commander.current_joints()))
-        response = request_service("compute_fk", GetPositionFK, request, TIMEOUT_S)
-        if not response.pose_stamped:
-            raise CallError(
-                f"'{rospy.resolve_name('compute_fk')}' did not return the pose of link '{link}': "
-                f"{error_name(response.error_code.val)}"
-            )
-        return moved(response.pose_stamped[0], self._offset, self._in_tip)
+        (tip,) = link_poses(commander, [commander.group.tip_link], TIMEOUT_S)
+        return moved(tip, self._offset, self._in_tip)
 
     def _path(self, commander: Any, target: PoseStamped) -> Any:
         request = self._request
