@@ -8,7 +8,7 @@ late, and every cancel must take effect within 20 ms: the bars hold for the maxi
 
 A goal of ten points shows what the machine does without such goals. Beside the figures are the longest time for which
 the loop had no processor, the longest time for which a witness had none (see `processor_witness.py`), the time that the
-host kept for other machines, and the load: they tell a late loop from a machine that was busy elsewhere.
+host kept for other machines, and the load: they distinguish a late loop from a busy machine.
 """
 
 from __future__ import annotations

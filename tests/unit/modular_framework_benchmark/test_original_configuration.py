@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A configuration folder of the original framework is checked as it is."""
+"""A configuration folder of the original framework is checked without a change."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Limits:
         return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in violated), "")
 
     def describe(self, what: str) -> str:
-        """Returns a description of the range; ``noun`` is "a number" or "a whole number"."""
+        """Returns a description of the range; ``what`` is "a number" or "a whole number"."""
         parts = [f"{name.replace('_', ' ')} {bound:g}" for name, bound in self.bounds().items()]
         if not parts:
             return what.replace("a ", "a finite ", 1)
