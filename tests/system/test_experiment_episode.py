@@ -22,7 +22,7 @@ from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunn
 from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.registry import METRICS
-from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, NoContact, On
+from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, NoContact, OnTopOf
 from modular_framework_benchmark.predicates.predicate import Not
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
@@ -39,7 +39,7 @@ PICK = TaskSettings(
         Milestone(name="touched", predicate=Not(NoContact(object="cube_1"))),
         Milestone(name="grasped", predicate=HeldFor(object="cube_1", duration=0.2)),
         Milestone(name="lifted", predicate=Lifted(object="cube_1", height=0.1), weight=2.0),
-        Milestone(name="put_back", predicate=On(object="cube_1", support="table")),
+        Milestone(name="put_back", predicate=OnTopOf(object="cube_1", support="table")),
     ),
     metrics=tuple(METRICS),
     time_limit=ENOUGH_S,

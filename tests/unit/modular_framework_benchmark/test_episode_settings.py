@@ -44,7 +44,7 @@ def test_every_condition_is_stored_and_read_again_and_its_parts_are_documented()
         "in_region": {"region": region},
         "cleared": {"region": region, "objects": ("a", "b")},
         "stacked": {"objects": ("a", "b")},
-        "on": {"support": "a"},
+        "on_top_of": {"support": "a"},
         "inside": {"container": "a"},
         "joint_at_least": {"model": "a", "joint": "b", "position": 1.0},
     }
@@ -60,6 +60,10 @@ def test_every_condition_is_stored_and_read_again_and_its_parts_are_documented()
     assert stored_settings("task", as_json(settings)) == settings
     assert as_json(parts[0]) == {"lifted": {"duration": 1.5, "object": "cube", "height": 0.1}}
     assert from_json(Milestone, as_json(settings.progress[0])) == settings.progress[0]
+    old = Milestone(name="m", predicate=parts[list(CONDITIONS).index("on_top_of")])
+    content = as_json(old)
+    content["predicate"] = {"on": content["predicate"]["on_top_of"]}
+    assert from_json(Milestone, content) == old
 
 
 def test_a_launch_file_has_a_package_or_is_a_path_and_the_task_is_an_argument(tmp_path: Path) -> None:

@@ -13,14 +13,26 @@ from experiment_texts import PICK, FakeResources, faults_of, read
 from modular_framework_benchmark.experiments.experiment import StoppingKind
 from modular_framework_benchmark.experiments.experiment_file import load_experiment, read_experiment
 from modular_framework_benchmark.experiments.metric_choices import read_metrics
+from modular_framework_benchmark.experiments.predicate_reading import PREDICATES
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.metrics.registry import METRICS
-from modular_framework_benchmark.predicates.conditions import HeldFor, InRegion, Lifted, NoContact, On, Region, Upright
+from modular_framework_benchmark.predicates.conditions import (
+    HeldFor,
+    InRegion,
+    Lifted,
+    NoContact,
+    OnTopOf,
+    Region,
+    Upright,
+)
 from modular_framework_benchmark.predicates.predicate import All, Any, InOrder, Not
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, MetricKind
 from modular_framework_core.files.faults import FaultList
+from modular_framework_core.files.located_yaml import load
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_every_combination_has_the_settings_of_the_base_and_of_its_levels(tmp_path: Path) -> None:
@@ -64,6 +76,26 @@ def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_pa
     assert poses(PICK.replace("rests_at: 0.8", "on: 0.8")) == expected
 
 
+def test_pyyaml_keeps_the_names_of_predicates_and_the_shipped_experiments() -> None:
+    for name in PREDICATES:
+        assert yaml.safe_load(f"{name}: 1") == {name: 1}
+    shipped = sorted((ROOT / "src/modular_framework_api/experiments").glob("*.yaml"))
+    assert shipped
+    for file in shipped:
+        assert yaml.safe_load(file.read_text()) == load(file, FaultList()).plain(), file
+
+
+@pytest.mark.parametrize("old", ["on", "'on'"])
+def test_the_old_name_of_a_predicate_is_read(old: str, tmp_path: Path) -> None:
+    text = PICK.replace(
+        "success: {lifted: 0.1}",
+        "success: {on_top_of: {support: table}, any: [{on_top_of: {support: table}}, {upright: {}}]}\n"
+        "progress: [{on_top_of: {support: table}, name: put_down}]",
+    )
+    found, expected = (read(each, tmp_path).combinations[0].settings for each in (text.replace("on_top_of", old), text))
+    assert (found.success, found.progress) == (expected.success, expected.progress)
+
+
 def test_a_listed_design_runs_only_what_it_lists(tmp_path: Path) -> None:
     listed = "\ndesign: [{method: above, planner: PRM, object: cube}, {object: cube, method: aside, planner: PRM}]\n"
     experiment = read(PICK + listed, tmp_path)
@@ -92,7 +124,7 @@ def test_predicates_and_milestones_are_about_the_first_object_unless_they_name_a
 {REGIONS}
 success:
   in_region: {{region: goal}}
-  any: [{{on: {{support: table}}}}, {{not: {{upright: {{}}, no_contact: {{other: table}}}}}}]
+  any: [{{on_top_of: {{support: table}}}}, {{not: {{upright: {{}}, no_contact: {{other: table}}}}}}]
   in_order: [{{held_for: {{duration: 1}}}}, {{no_contact: {{}}}}]
   hold_time: 1
 """,
@@ -102,7 +134,7 @@ success:
     assert settings.success.hold_s == 1.0 and not settings.success.is_pick
     goal = Region(name="goal", x=(0.0, 0.2), y=(0.4, 0.6))
     resting = Any((
-        On(object="ball_1", support="table"),
+        OnTopOf(object="ball_1", support="table"),
         Not(All((Upright(object="ball_1"), NoContact(object="ball_1", other="table")))),
     ))  # fmt: skip
     released = InOrder((HeldFor(object="ball_1", duration=1.0), NoContact(object="ball_1")))
@@ -141,9 +173,9 @@ def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
     ("success", "at", "fault"),
     [
         ("{liftd: {}}", "liftd", "the key of success 'liftd' is unknown; allowed: lifted, hold_time, shake, object,"),
-        ("{on: {}}", "{}", "on needs the key 'support'; add it"),
-        ("{on: {support: tabel}}", "tabel", "support of on 'tabel' is unknown; allowed: cube_1, ball_1, ground_plane, "
-         "table; did you mean 'table'?"),
+        ("{on_top_of: {}}", "{}", "on_top_of needs the key 'support'; add it"),
+        ("{on_top_of: {support: tabel}}", "tabel", "support of on_top_of 'tabel' is unknown; allowed: cube_1, ball_1, "
+         "ground_plane, table; did you mean 'table'?"),
         ("{upright: {object: cub_1}}", "cub_1", "object of upright 'cub_1' is unknown; allowed: cube_1, ball_1;"),
         ("{object: cub_1}", "cub_1", "the object of success 'cub_1' is unknown; allowed: cube_1, ball_1; did you mean"),
         ("{in_region: {region: gaol}}", "gaol", "region of in_region 'gaol' is unknown; allowed: goal, away; did you"),
@@ -153,7 +185,7 @@ def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
         ("{held_for: {duration: -1}}", "-1", "duration of held_for must be a number from 0 to 3600"),
         ("{stacked: {objects: [cube_1]}}", "{objects", "stacked needs at least two objects, the lowest first"),
         ("{aligned: {position: [0, 1]}}", "[0", "position of aligned has 2 numbers; allowed: 3"),
-        ("{all: {upright: {}}}", "{upright", "all must be a list such as [{on: {support: table}}, ...], found a"),
+        ("{all: {upright: {}}}", "{upright", "all must be a list such as [{on_top_of: {support: table}}, ...], found"),
         ("{all: [{uprigt: {}}]}", "uprigt", "the predicate 'uprigt' is unknown; allowed: lifted, held_for, in_region"),
         ("{not: {}}", "{}", "a predicate of not has no predicate; add one"),
         ("{all: [{in_region: {region: goal}}, {in_region: {region: away}}], shake: 1}", "{all",
@@ -161,7 +193,7 @@ def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
         ("{held_for: {}, no_contact: {}}", "{held_for", "success contradicts itself: 'cube_1' is in the gripper, but"),
         ("{lifted: {height: 0.2}, not_moved: {}}", "{lifted", "success contradicts itself: 'cube_1' is more than"),
         ("{upright: {}, not: {upright: {}}}", "{upright", "success contradicts itself: 'cube_1' stands upright, but"),
-        ("{on: {support: cube_1}}", "{on", "success contradicts itself: 'cube_1' lies on 'cube_1' names"),
+        ("{on_top_of: {support: cube_1}}", "{on_top_of", "success contradicts itself: 'cube_1' lies on 'cube_1' names"),
     ],
 )  # fmt: skip
 def test_a_wrong_predicate_is_refused_with_its_place_and_the_nearest_name(

@@ -20,7 +20,7 @@ from modular_framework_benchmark.predicates.conditions import (
     Lifted,
     NoContact,
     NotMoved,
-    On,
+    OnTopOf,
     Region,
     Stacked,
     Upright,
@@ -98,7 +98,7 @@ def test_a_condition_on_poses_holds_within_its_tolerance(
 
 
 def test_an_object_lies_on_what_it_touches_below_its_centre() -> None:
-    on, touch = On(object="cube", support="table"), [("cube", "table")]
+    on, touch = OnTopOf(object="cube", support="table"), [("cube", "table")]
     assert last(on, {}, contacts=touch)
     assert not last(on, {})  # no contact
     assert not last(on, {"cube": state((0, 0, STANDING_M + 0.02))}, contacts=touch)  # above it

@@ -11,13 +11,20 @@ from typing import Any
 from modular_framework_benchmark.experiments.reading import ValueReading
 from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
 from modular_framework_benchmark.predicates import predicate as predicates
-from modular_framework_benchmark.predicates.conditions import CONDITIONS, Region, Span, Stacked
+from modular_framework_benchmark.predicates.conditions import (
+    CONDITIONS,
+    OLD_ON_TOP_OF,
+    ON_TOP_OF,
+    Region,
+    Span,
+    Stacked,
+)
 from modular_framework_benchmark.predicates.contradictions import contradiction, repetition
 from modular_framework_benchmark.predicates.predicate import Condition, Predicate
 from modular_framework_benchmark.predicates.predicate_keys import KeyKind, PredicateKey, keys_of
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
-from modular_framework_core.task_constructor.key_spelling import corrected_keys
+from modular_framework_core.task_constructor.key_spelling import corrected_keys, renamed_key
 
 COMBINATIONS: dict[str, Callable[[tuple[Predicate, ...]], Predicate]] = {
     "all": predicates.All,
@@ -28,7 +35,7 @@ PREDICATES = (*CONDITIONS, *COMBINATIONS, "not")
 SHORT_FORM = {"lifted": 10.0, "hold_time": 3600.0, "shake": 3600.0}
 """Numbers of the short form of `success`, with their largest values."""
 MILESTONE_KEYS = ("name", "weight")
-EXAMPLE = "{on: {support: table}}"
+EXAMPLE = "{on_top_of: {support: table}}"
 MAX_M = 1000.0
 
 
@@ -69,7 +76,8 @@ class PredicateReading:
         mapping = self.reading.mapping(node, key, "{lifted: 0.10, hold_time: 2.0}")
         if mapping is None:
             return None
-        node = corrected_keys(mapping, (*SHORT_FORM, "object", *PREDICATES), f"the key of {key}", self.reading.faults)
+        known = (*SHORT_FORM, "object", *PREDICATES)
+        node = self._corrected(mapping, known, f"the key of {key}")
         short = {name: node.entries[name] for name in SHORT_FORM if isinstance(node.entries.get(name), Scalar)}
         found: dict[str, Any] = {
             name: self.reading.number(value, name, 0.0, SHORT_FORM[name]) for name, value in short.items()
@@ -114,7 +122,7 @@ class PredicateReading:
         mapping = self.reading.mapping(item, f"each of {key}", EXAMPLE)
         if mapping is None:
             return None
-        node = corrected_keys(mapping, (*MILESTONE_KEYS, *PREDICATES), "the key of a milestone", self.reading.faults)
+        node = self._corrected(mapping, (*MILESTONE_KEYS, *PREDICATES), "the key of a milestone")
         rest = [name for name in node.entries if name not in MILESTONE_KEYS]
         predicate = self._conjunction(_selected(node, rest), f"a milestone of {key}")
         weight = self.reading.number(node.entries["weight"], "weight", 0.0, 1e6) if "weight" in node.entries else 1.0
@@ -153,9 +161,11 @@ class PredicateReading:
         mapping = self.reading.mapping(item, f"a predicate of {name}", EXAMPLE)
         if mapping is None:
             return None
-        return self._conjunction(
-            corrected_keys(mapping, PREDICATES, "the predicate", self.reading.faults), f"a predicate of {name}"
-        )
+        return self._conjunction(self._corrected(mapping, PREDICATES, "the predicate"), f"a predicate of {name}")
+
+    def _corrected(self, node: Mapping, known: Collection[str], what: str) -> Mapping:
+        """Returns a mapping of predicates with known keys only; adds a fault for each unknown key."""
+        return corrected_keys(renamed_key(node, OLD_ON_TOP_OF, ON_TOP_OF), known, what, self.reading.faults)
 
     def _condition(self, name: str, value: Node) -> Condition | None:
         mapping = self.reading.mapping(value, name, "{object: cube_1}")

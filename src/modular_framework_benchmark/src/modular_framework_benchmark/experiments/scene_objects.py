@@ -20,7 +20,7 @@ from modular_framework_benchmark.experiments.resource_lookup import UnresolvedRe
 from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
 from modular_framework_core.files.located_yaml import Sequence as ListNode
-from modular_framework_core.task_constructor.key_spelling import corrected_keys
+from modular_framework_core.task_constructor.key_spelling import corrected_keys, renamed_key
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.model_extents import reach
@@ -108,7 +108,7 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     mapping = reading.mapping(item, "each of objects", EXAMPLE)
     if mapping is None:
         return None
-    node = corrected_keys(_renamed(mapping), KEYS, "the key of an object", reading.faults)
+    node = corrected_keys(renamed_key(mapping, OLD_SURFACE, SURFACE), KEYS, "the key of an object", reading.faults)
     if "model" not in node.entries:
         reading.faults.add(node.location, f"an object needs a model; add one, such as {EXAMPLE}")
         return None
@@ -128,18 +128,6 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     model = reading.text(node.entries["model"], "model")
     name = reading.name(node.entries["name"], "name") if "name" in node.entries else None
     return None if model is None else ObjectNodes(node, model, name, pose, surface)
-
-
-def _renamed(mapping: Mapping) -> Mapping:
-    """Returns the mapping with OLD_SURFACE renamed to SURFACE, unless both are present."""
-    if SURFACE in mapping.entries:
-        return mapping
-    names = {key: SURFACE if key == OLD_SURFACE else key for key in mapping.entries}
-    return Mapping(
-        {names[key]: value for key, value in mapping.entries.items()},
-        {names[key]: location for key, location in mapping.keys.items()},
-        mapping.location,
-    )
 
 
 def _named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:

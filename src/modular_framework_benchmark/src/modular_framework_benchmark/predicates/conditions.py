@@ -16,7 +16,10 @@ from scipy.spatial.transform import Rotation
 from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.predicate_keys import KeyKind, name, number, vector
 from modular_framework_benchmark.predicates.world_track import ROBOT, WORLD, BodyTrack, Flags, Floats, WorldTrack
+from modular_framework_benchmark.records.episode_settings import Tagged
 
+ON_TOP_OF, OLD_ON_TOP_OF = "on_top_of", "on"
+"""Name of a predicate, and its old name, which PyYAML reads and writes as true."""
 Span = tuple[float, float]
 
 
@@ -150,7 +153,7 @@ class InRegion(ObjectCondition):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class On(ObjectCondition):
+class OnTopOf(ObjectCondition):
     """The object lies on a support.
 
     The object touches the support, the lowest point of the object's box is at the height of the highest point of the
@@ -491,10 +494,10 @@ class Stacked(Condition):
         return f"{', '.join(self.objects)} are stacked, the lowest first"
 
     @property
-    def pairs(self) -> tuple[On, ...]:
+    def pairs(self) -> tuple[OnTopOf, ...]:
         """Returns the conditions on neighbouring objects, from the bottom."""
         neighbours = zip(self.objects, self.objects[1:], strict=False)
-        return tuple(On(object=upper, support=lower, tolerance=self.tolerance) for lower, upper in neighbours)
+        return tuple(OnTopOf(object=upper, support=lower, tolerance=self.tolerance) for lower, upper in neighbours)
 
     def within(self, world: WorldTrack) -> Flags:
         """Returns whether all pairs lie on each other, shape (n,)."""
@@ -510,7 +513,7 @@ CONDITIONS: dict[str, type[Condition]] = {
     "lifted": Lifted,
     "held_for": HeldFor,
     "in_region": InRegion,
-    "on": On,
+    ON_TOP_OF: OnTopOf,
     "inside": Inside,
     "upright": Upright,
     "aligned": Aligned,
@@ -521,3 +524,4 @@ CONDITIONS: dict[str, type[Condition]] = {
     "stacked": Stacked,
 }
 """All conditions, keyed by their name in experiment files."""
+Tagged.kinds[OLD_ON_TOP_OF] = OnTopOf  # in records of older versions

@@ -16,7 +16,7 @@ from modular_framework_benchmark.predicates.conditions import (
     Lifted,
     NoContact,
     NotMoved,
-    On,
+    OnTopOf,
     Stacked,
 )
 from modular_framework_benchmark.predicates.predicate import All, Condition, Not, Predicate
@@ -83,9 +83,9 @@ def _excludes(one: Predicate, other: Predicate) -> bool:
             return one.object == other.object and one.height >= other.distance
         case HeldFor(), NoContact():
             return one.object == other.object and other.other == ROBOT
-        case On(), NoContact():
+        case OnTopOf(), NoContact():
             return {one.object, one.support} == {other.object, other.other}
-        case On(), On():
+        case OnTopOf(), OnTopOf():
             return (one.object, one.support) == (other.support, other.object)
         case Inside(), Inside():
             return (one.object, one.container) == (other.container, other.object)

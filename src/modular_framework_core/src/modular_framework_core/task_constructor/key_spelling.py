@@ -50,3 +50,21 @@ def corrected_keys(node: Mapping, known: Collection[str], what: str, faults: Fau
             entries[intended], keys[intended] = value, node.keys[key]
             faults.harmless += 1
     return Mapping(entries, keys, node.location)
+
+
+def renamed_key(node: Mapping, old: str, new: str) -> Mapping:
+    """Returns the mapping with an old key under its new name, unless both are present.
+
+    Args:
+        node: Mapping as written.
+        old: Former name of the key, which files may still use.
+        new: Name of the key.
+    """
+    if new in node.entries:
+        return node
+    names = {key: new if key == old else key for key in node.entries}
+    return Mapping(
+        {names[key]: value for key, value in node.entries.items()},
+        {names[key]: location for key, location in node.keys.items()},
+        node.location,
+    )
