@@ -128,3 +128,11 @@ def test_only_two_successive_states_change_the_modes() -> None:
     assert [modes.confirm(each) for each in (running, running)] == [False, True]
     assert [modes.confirm(each) for each in (idle, running, idle, running)] == [False, True, False, True]
     assert [modes.confirm(each) for each in (idle, idle, idle)] == [False, True, True]
+
+
+def test_states_with_damaged_data_between_them_do_not_change_the_modes() -> None:
+    modes = ModeConfirmation()
+    running, idle, damaged = (7, 1, 2), (5, 1, 2), None
+    assert [modes.confirm(each) for each in (damaged, damaged, running, running)] == [False, False, False, True]
+    assert [modes.confirm(each) for each in (idle, damaged, idle, damaged, running)] == [False] * 4 + [True]
+    assert [modes.confirm(each) for each in (damaged, idle, idle)] == [False, False, True]

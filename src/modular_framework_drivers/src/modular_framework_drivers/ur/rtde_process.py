@@ -84,9 +84,8 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
         state = read_new_state(arm, now_s, last_timestamp_s)
         if state is not None:
             last_timestamp_s = state.timestamp_s
-            heard = is_plausible(state, last_state)
+            heard = modes.confirm(state.modes if is_plausible(state, last_state) else None)
             damaged_count = 0 if heard else damaged_count + 1
-            heard = heard and modes.confirm(state.modes)
             if heard:
                 last_state, last_sent_s = state, now_s
                 _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).packed())

@@ -23,9 +23,14 @@ class ModeConfirmation:
         self._accepted: tuple[int, ...] | None = None
         self._previous: tuple[int, ...] | None = None
 
-    def confirm(self, modes: tuple[int, ...]) -> bool:
-        """Returns whether the modes of the newest state are those accepted, or those of the state before."""
-        is_confirmed = modes in (self._accepted, self._previous)
+    def confirm(self, modes: tuple[int, ...] | None) -> bool:
+        """Returns whether the modes of the newest state are those accepted, or those of the state before.
+
+        Args:
+            modes: Modes of the newest state; None for a state read from damaged data. After damaged data, two further
+                states must agree, because successive states are then likely to be damaged as well.
+        """
+        is_confirmed = modes is not None and modes in (self._accepted, self._previous)
         self._previous = modes
         if is_confirmed:
             self._accepted = modes
