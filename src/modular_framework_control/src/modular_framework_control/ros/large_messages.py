@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import socket
 from collections.abc import Iterator
 from typing import Any
 
 from rospy.impl.tcpros_base import TCPROSTransport
 
 _PIECE_BYTES = 1 << 16  # bytes
+_QUEUE_BYTES = 1 << 17  # of received data in the kernel, per connection
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _TRIM_THRESHOLD_BYTES = 64 << 20
 _MMAP_THRESHOLD_BYTES = 1 << 20
@@ -78,14 +80,21 @@ def receive_in_pieces() -> None:
     """Makes all later connections of this process receive large messages in chunks.
 
     The C library keeps the freed memory: returning it to the system would interrupt every processor of the process.
+    The receive queue of a connection is short: a kernel without preemption copies all that fits into the queue at once,
+    and meanwhile runs nothing else on that processor, not even a thread with real-time priority.
     """
     library = ctypes.CDLL(None)
     library.mallopt(_M_MMAP_THRESHOLD, _MMAP_THRESHOLD_BYTES)
     library.mallopt(_M_TRIM_THRESHOLD, _TRIM_THRESHOLD_BYTES)
-    initialise = TCPROSTransport.__init__
+    initialise, connect = TCPROSTransport.__init__, TCPROSTransport.connect
 
     def initialise_with_pieces(transport: Any, *arguments: Any, **fields: Any) -> None:
         initialise(transport, *arguments, **fields)
         transport.read_buff = ReceiveBuffer()
 
+    def connect_with_short_queue(transport: Any, *arguments: Any, **fields: Any) -> None:
+        connect(transport, *arguments, **fields)
+        transport.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _QUEUE_BYTES)
+
     TCPROSTransport.__init__ = initialise_with_pieces
+    TCPROSTransport.connect = connect_with_short_queue
