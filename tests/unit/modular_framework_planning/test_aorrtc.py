@@ -17,8 +17,8 @@ from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConne
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
 )
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
@@ -35,7 +35,7 @@ def shortest_way() -> float:
     return 2.0 * (math.sqrt(to_corner**2 - RADIUS**2) + RADIUS * slope) + RIGHT - LEFT
 
 
-def planned(planner_id: str, seed: int, repeatable: bool = True) -> PlanningAnswer:
+def planned(planner_id: str, seed: int, repeatable: bool = True) -> PlanningResult:
     model = gantry()
     pose = pin.SE3(np.eye(3), np.array([0.5, BELOW + 0.5, 0.0]))
     box = CollisionObject("box", pose, ((Box(RIGHT - LEFT, 1.0, 0.1), pin.SE3.Identity()),))

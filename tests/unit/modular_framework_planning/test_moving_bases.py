@@ -14,8 +14,8 @@ from modular_framework_planning.kinematics.inverse_kinematics import KinematicsP
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     PoseGoal,
     Workspace,
 )
@@ -57,7 +57,7 @@ def walled(model: RobotModel, kind: str) -> PlanningScene:
     return scene.with_positions(model.merge(scene.positions, STAND[kind]))
 
 
-def plan(model: RobotModel, request: PlanningRequest) -> PlanningAnswer:
+def plan(model: RobotModel, request: PlanningRequest) -> PlanningResult:
     settings = PipelineSettings(seed=2, default_velocity_scaling_factor=1.0, default_acceleration_scaling_factor=1.0)
     return PipelineSpec(settings=settings).build(model, KinematicsPool(model)).plan(request)
 
@@ -102,7 +102,7 @@ def test_a_base_drives_round_a_wall_without_touching_it_and_stays_in_the_workspa
     _check_message(model, answer, group)
 
 
-def _check_message(model: RobotModel, answer: PlanningAnswer, group: str) -> None:
+def _check_message(model: RobotModel, answer: PlanningResult, group: str) -> None:
     """The message has the base as transforms, the rest as joints, both at the same times."""
     message = trajectory_message(answer.trajectory, model)
     assert message.multi_dof_joint_trajectory.joint_names == ["drive"]

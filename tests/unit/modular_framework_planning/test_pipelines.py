@@ -29,8 +29,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
@@ -90,7 +90,7 @@ def failure(pipeline: PlanningPipeline, request: PlanningRequest) -> PlanningErr
     return caught.value
 
 
-def arrives(answer: PlanningAnswer, values: tuple[float, ...] = GOAL) -> bool:
+def arrives(answer: PlanningResult, values: tuple[float, ...] = GOAL) -> bool:
     return bool(np.allclose(answer.trajectory.positions[-1], values, atol=1e-9))
 
 

@@ -63,14 +63,14 @@ def test_the_two_bodies_named_are_those_that_touch_most_often(small: RobotModel)
     rng = np.random.default_rng(2)
     scene, _ = random_world(small, rng)
     checker, plain, expected = ExactCollisionChecker(scene), PlainCoalChecker(scene), Counter[frozenset[str]]()
-    assert checker.most_refusals() is None
+    assert checker.most_frequent_contact() is None
     while sum(expected.values()) < 60:
         state = small.with_mimics(rng.uniform(small.lower, small.upper))
         found = plain.contacts(state)
         if len(found) == 1:  # of several any one may be met first
             expected[frozenset((found[0].first.name, found[0].second.name))] += 1
             assert not checker.is_free(state)
-    most = checker.most_refusals()
+    most = checker.most_frequent_contact()
     assert most is not None
     assert expected[frozenset((most.first, most.second))] == most.checks == max(expected.values())
 

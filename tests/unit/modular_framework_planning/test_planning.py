@@ -19,8 +19,8 @@ from modular_framework_planning.planning_interface.motion_check import MotionChe
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
@@ -103,7 +103,7 @@ def test_verdicts_equal_those_of_an_independent_checker(model: RobotModel, check
             assert ours.is_free(positions) == (not ours.contacts(positions))
 
 
-def check_timing(model: RobotModel, answer: PlanningAnswer, factor: float) -> None:
+def check_timing(model: RobotModel, answer: PlanningResult, factor: float) -> None:
     motion, group = answer.trajectory, model.group(GROUP)
     assert (np.diff(motion.times) > 0).all() and motion.times[0] == 0.0
     assert (np.abs(motion.velocities) <= model.max_velocity[group.indices] * factor * (1 + 1e-6)).all()

@@ -101,7 +101,7 @@ def counts_of_verdicts(scene: PlanningScene, moving: np.ndarray | None, rng: np.
         assert free == fresh.is_free(state)
         counts[0 if free else 1] += 1
         counts[2] += free != plain.is_free(state) and not is_near and (free or not has_mesh)
-    assert ours.most_refusals() == fresh.most_refusals()
+    assert ours.most_frequent_contact() == fresh.most_frequent_contact()
     return counts
 
 

@@ -18,8 +18,8 @@ from modular_framework_planning.planners.stomp.settings import StompSettings, re
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.plugins import make_adapters
@@ -49,7 +49,7 @@ def planned(
     parameters: dict[str, object] | None = None,
     goal: tuple[float, ...] = GOAL,
     **request: object,
-) -> PlanningAnswer:
+) -> PlanningResult:
     settings = PipelineSettings(seed=4, parameters=parameters or {})
     pipeline = PlanningPipeline(
         KinematicsPool(model), settings, StompPlanner.configure(model, settings), adapters=make_adapters()

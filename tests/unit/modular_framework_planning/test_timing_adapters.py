@@ -16,8 +16,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
 )
 from modular_framework_planning.planning_pipeline.adapters.add_iterative_spline_parameterization import (
     AddIterativeSplineParameterization,
@@ -76,7 +76,7 @@ def planned(
     planner: object = None,
     scene: PlanningScene | None = None,
     **request: object,
-) -> PlanningAnswer:
+) -> PlanningResult:
     settings = PipelineSettings(
         parameters=parameters or {}, default_velocity_scaling_factor=0.1, default_acceleration_scaling_factor=0.2
     )

@@ -24,8 +24,8 @@ from modular_framework_planning.planning_interface.planning_request import (
     ConstraintGoal,
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
@@ -38,7 +38,7 @@ ARM = ("pan", "lift", "elbow", "roll")
 SIDES = ("left", "right")
 
 
-def plan(request: PlanningRequest) -> PlanningAnswer:
+def plan(request: PlanningRequest) -> PlanningResult:
     settings = PipelineSettings(seed=2, default_velocity_scaling_factor=1.0, default_acceleration_scaling_factor=1.0)
     return PipelineSpec(settings=settings).build(robot(), KinematicsPool(robot())).plan(request)
 

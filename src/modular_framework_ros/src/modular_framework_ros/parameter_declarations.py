@@ -124,9 +124,9 @@ class Declaration:
         return self.at_least <= value <= self.at_most and value > self.above and math.isfinite(value)
 
 
-def _is_of(word: str, value: Any) -> bool:
+def _is_of(type_name: str, value: Any) -> bool:
     """Returns whether a value has a declared type; booleans are not numbers."""
-    kinds = TYPES[word][0]
+    kinds = TYPES[type_name][0]
     return isinstance(value, kinds) and (object in kinds or isinstance(value, bool) == (bool in kinds))
 
 
@@ -209,21 +209,21 @@ class ParameterReader:
         return found
 
 
-def parameters_below(package: str, name: str, own: NodeHandle, root: NodeHandle) -> ParameterReader:
+def parameters_below(package: str, name: str, private_handle: NodeHandle, root_handle: NodeHandle) -> ParameterReader:
     """Returns a reader for the parameters of a plugin, such as hardware, that has its own declaration.
 
     Args:
         package: Package of the plugin.
         name: Name of the file in the folder `parameters`; for hardware its class.
-        own: Node handle for names that begin with `~`.
-        root: Node handle for all other names.
+        private_handle: Node handle for names that begin with `~`.
+        root_handle: Node handle for all other names.
 
     Raises:
         DeclarationError: The declaration is missing or invalid.
     """
 
     def resolve(declared: str) -> tuple[NodeHandle, str]:
-        return (own, declared[1:]) if declared.startswith("~") else (root, declared)
+        return (private_handle, declared[1:]) if declared.startswith("~") else (root_handle, declared)
 
     def get(declared: str) -> Any:
         handle, key = resolve(declared)

@@ -112,17 +112,17 @@ def parse_parameters(text: str, file_path: Path | str) -> dict[str, Any]:
         raise ParameterFileError(
             f"{file_path}:1: contains a {type(content).__name__}; it must be a mapping of parameter names to values"
         )
-    parameters: dict[str, Any] = _settable(content)
+    parameters: dict[str, Any] = _parameter_value(content)
     return parameters
 
 
-def _settable(value: Any) -> Any:
+def _parameter_value(value: Any) -> Any:
     """Returns a YAML value converted to the types of the parameter server."""
     match value:
         case dict():
-            return {str(key): _settable(item) for key, item in value.items() if item is not None}
+            return {str(key): _parameter_value(item) for key, item in value.items() if item is not None}
         case list():
-            return [_settable(item) for item in value if item is not None]
+            return [_parameter_value(item) for item in value if item is not None]
         case str() | bool() | int() | float():
             return value
     return str(value)  # a date

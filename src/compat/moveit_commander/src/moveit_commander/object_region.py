@@ -24,11 +24,11 @@ class Region:
         return all(low <= value <= high for low, value, high in zip(self.low, point, self.high, strict=True))
 
 
-def inside(item: CollisionObject, region: Region) -> bool:
+def inside(collision_object: CollisionObject, region: Region) -> bool:
     """Returns whether all shape origins of an object, or its own origin without shapes, lie in the region."""
-    shapes = [*item.primitive_poses, *item.mesh_poses, *item.plane_poses]
-    points = [transform_point(item.pose, pose.position) for pose in shapes]
-    origin = item.pose.position
+    shapes = [*collision_object.primitive_poses, *collision_object.mesh_poses, *collision_object.plane_poses]
+    points = [transform_point(collision_object.pose, pose.position) for pose in shapes]
+    origin = collision_object.pose.position
     return all(region.contains(point) for point in points or [(origin.x, origin.y, origin.z)])
 
 

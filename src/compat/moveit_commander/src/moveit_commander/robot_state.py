@@ -92,23 +92,23 @@ class CurrentState:
         if self._transforms is not None:
             self._transforms.listener.unregister()
 
-    def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
+    def positions(self, variables: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
         """Returns positions received after this call [rad or m], with mimic joints and a base that tf provides.
 
         Args:
-            needed: Variables to wait for; empty for every active joint that is not passive.
+            variables: Variables to wait for; empty for every active joint that is not passive.
             timeout_s: Maximum wait [s].
 
         Raises:
             ServerError: A needed joint was not received in time.
         """
-        names = set(needed) or {variable.name for variable in self.model.variables}
+        names = set(variables) or {variable.name for variable in self.model.variables}
         names = {self.model.mimics[name].leader if name in self.model.mimics else name for name in names}
         names -= self.model.passive | {variable.name for variable in self.model.base_variables}
-        begun = time.monotonic()
+        start_s = time.monotonic()
         with self._changed:
-            if not self._changed.wait_for(lambda: self._fresh(names, begun), timeout_s):
-                missing = sorted(name for name in names if self._arrivals.get(name, 0.0) < begun)
+            if not self._changed.wait_for(lambda: self._received_since(names, start_s), timeout_s):
+                missing = sorted(name for name in names if self._arrivals.get(name, 0.0) < start_s)
                 raise ServerError(
                     f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
                     f"{', '.join(missing)}; does the joint state controller run?"
@@ -116,12 +116,12 @@ class CurrentState:
             received = dict(self._positions)
         return self.model.complete(received | self._base_values())
 
-    def message(self, needed: Iterable[str] = ()) -> RobotState:
+    def message(self, variables: Iterable[str] = ()) -> RobotState:
         """Returns the current state as a message in the planning frame; `positions` documents the arguments.
 
         Without a planar or floating base from tf, move_group keeps its own base pose.
         """
-        return self.message_of(self.positions(needed))
+        return self.message_of(self.positions(variables))
 
     def _base_values(self) -> dict[str, float]:
         """Returns the variables of a planar or floating base from tf; empty if tf has no transform."""
@@ -156,8 +156,8 @@ class CurrentState:
                 values |= base_values(self.model, transform)
         return values
 
-    def _fresh(self, names: Iterable[str], begun: float) -> bool:
-        return all(self._arrivals.get(name, 0.0) >= begun for name in names)
+    def _received_since(self, names: Iterable[str], start_s: float) -> bool:
+        return all(self._arrivals.get(name, 0.0) >= start_s for name in names)
 
     def _on_joint_state(self, message: JointState) -> None:
         now = time.monotonic()

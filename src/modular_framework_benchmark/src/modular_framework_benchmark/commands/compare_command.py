@@ -41,12 +41,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _compare(given: argparse.Namespace) -> int:
-    if given.after is None and not (given.experiment and given.other and given.experiment != given.other):
+def _compare(arguments: argparse.Namespace) -> int:
+    if arguments.after is None and not (
+        arguments.experiment and arguments.other and arguments.experiment != arguments.other
+    ):
         raise ReportError("a single database needs two experiments; add --experiment NAME --with NAME")
     with (
-        open_source(given.before, given.experiment) as before,
-        open_source(given.after or given.before, given.other or given.experiment) as after,
+        open_source(arguments.before, arguments.experiment) as before,
+        open_source(arguments.after or arguments.before, arguments.other or arguments.experiment) as after,
     ):
         differing = (
             *differences_of(before.compared_snapshots, after.compared_snapshots),
@@ -54,7 +56,9 @@ def _compare(given: argparse.Namespace) -> int:
         )
         regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
         print(regression_text(regression), end="")
-        if given.into is not None:
-            write_file(given.into, regression_page(regression, before.database.label, after.database.label).encode())
-            print(f"compare: wrote {given.into}", file=sys.stderr)
-    return REGRESSED if given.fail_on_regression and regression.count(Change.WORSE) else 0
+        if arguments.into is not None:
+            write_file(
+                arguments.into, regression_page(regression, before.database.label, after.database.label).encode()
+            )
+            print(f"compare: wrote {arguments.into}", file=sys.stderr)
+    return REGRESSED if arguments.fail_on_regression and regression.count(Change.WORSE) else 0

@@ -25,18 +25,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_reporting(_parser(), arguments, _export)
 
 
-def _export(given: argparse.Namespace) -> int:
-    if given.lerobot is None and (given.rate is not None or given.where or given.succeeded):
+def _export(arguments: argparse.Namespace) -> int:
+    if arguments.lerobot is None and (arguments.rate is not None or arguments.where or arguments.succeeded):
         raise ExportError("--rate, --where and --succeeded require --lerobot; remove them, or add --lerobot FOLDER")
-    with open_database(given.database, read_only=True) as database:
-        number = find_experiment(database, given.experiment)
+    with open_database(arguments.database, read_only=True) as database:
+        number = find_experiment(database, arguments.experiment)
         for table_format in TableFormat:
-            folder = getattr(given, table_format.value)
+            folder = getattr(arguments, table_format.value)
             if folder is not None:
                 for path in export_tables(database.load(number), folder, table_format):
                     print(path)
-        if given.lerobot is not None:
-            _export_lerobot(database, number, given)
+        if arguments.lerobot is not None:
+            _export_lerobot(database, number, arguments)
     return 0
 
 
@@ -60,18 +60,18 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _export_lerobot(database: ResultDatabase, number: int, given: argparse.Namespace) -> None:
+def _export_lerobot(database: ResultDatabase, number: int, arguments: argparse.Namespace) -> None:
     description = next(stored.description for stored in database.experiments() if stored.id == number)
-    levels = _chosen_levels(given.where, description)
+    levels = _chosen_levels(arguments.where, description)
 
     def chosen(record: EpisodeRecord) -> bool:
-        if given.succeeded and not record.succeeded:
+        if arguments.succeeded and not record.succeeded:
             return False
         return all(record.spec.configuration[name] == level for name, level in levels.items())
 
-    rate = DEFAULT_RATE if given.rate is None else given.rate
-    summary = export_lerobot(database, number, given.lerobot, frames_per_second=rate, chosen=chosen)
-    print(f"{given.lerobot}: {summary.episodes} episodes, {summary.frames} frames at {rate} Hz")
+    rate = DEFAULT_RATE if arguments.rate is None else arguments.rate
+    summary = export_lerobot(database, number, arguments.lerobot, frames_per_second=rate, chosen=chosen)
+    print(f"{arguments.lerobot}: {summary.episodes} episodes, {summary.frames} frames at {rate} Hz")
     if summary.skipped:
         print(f"export: {len(summary.skipped)} episodes are omitted:", file=sys.stderr)
     for episode, reason in list(summary.skipped.items())[:MAX_REASONS]:

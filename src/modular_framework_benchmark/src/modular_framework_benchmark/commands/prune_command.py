@@ -60,22 +60,22 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _prune(given: argparse.Namespace) -> int:
-    with open_source(given.database, given.experiment) as opened:
+def _prune(arguments: argparse.Namespace) -> int:
+    with open_source(arguments.database, arguments.experiment) as opened:
         root = opened.database.folder.resolve()
         episodes = opened.results.episodes
         name = opened.results.description.name
-    chosen = episodes[(episodes["begun"] < time.time() - DAY_S * given.older_than) & (episodes["folder"] != "")]
-    if given.keep_failures:
+    chosen = episodes[(episodes["begun"] < time.time() - DAY_S * arguments.older_than) & (episodes["folder"] != "")]
+    if arguments.keep_failures:
         chosen = chosen[chosen["status"] == EpisodeStatus.SUCCEEDED.value]
-    paths = _paths(chosen, root, given.files)
+    paths = _paths(chosen, root, arguments.files)
     size = sum(tree_size(path) if path.is_dir() else path.lstat().st_size for path in paths)
-    for path in paths if given.delete else ():
+    for path in paths if arguments.delete else ():
         try:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         except OSError as error:
             raise ReportError(f"{path} cannot be deleted: {error.strerror}; earlier files are deleted") from error
-    verb, hint = ("deleted", "") if given.delete else ("would be deleted", "; add --delete to delete them")
+    verb, hint = ("deleted", "") if arguments.delete else ("would be deleted", "; add --delete to delete them")
     print(f"{name}: {size / GB:.3g} GB in {len(paths)} files and folders of {len(chosen)} episodes {verb}{hint}")
     return 0
 

@@ -26,19 +26,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_reporting(_parser(), arguments, _report)
 
 
-def write_page(opened: OpenedExperiment, into: Path) -> str:
+def write_page(experiment: OpenedExperiment, page: Path) -> str:
     """Writes the report page of an experiment; returns its summary as text.
 
     Args:
-        opened: Opened experiment.
-        into: File of the page.
+        experiment: Opened experiment.
+        page: File of the page.
 
     Raises:
         ReportError: The file is not writable.
         ResultsError: The database is unreadable.
     """
-    content = gather(opened.results, opened.source(into.absolute().parent))
-    write_file(into, report_page(content, opened.database.label).encode())
+    content = gather(experiment.results, experiment.source(page.absolute().parent))
+    write_file(page, report_page(content, experiment.database.label).encode())
     return answer_text(content)
 
 
@@ -63,27 +63,27 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _report(given: argparse.Namespace) -> int:
-    if given.figure and given.table:
+def _report(arguments: argparse.Namespace) -> int:
+    if arguments.figure and arguments.table:
         raise ReportError("--figure and --table are both given; remove one of them")
-    figure, image_format = _figure_and_format(given.figure or "")
+    figure, image_format = _figure_and_format(arguments.figure or "")
     if figure and figure != "list":
         find_browser()  # fails early, before a large database is read
-    with open_source(given.database, given.experiment) as opened:
-        name = opened.results.description.name
-        into = given.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
-        content = gather(opened.results, opened.source(into.absolute().parent), given.mean_intervals)
-        if given.table:
-            return _write_table(content, given)
+    with open_source(arguments.database, arguments.experiment) as experiment:
+        name = experiment.results.description.name
+        output = arguments.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
+        content = gather(experiment.results, experiment.source(output.absolute().parent), arguments.mean_intervals)
+        if arguments.table:
+            return _write_table(content, arguments)
         if figure == "list":
             print(*(f"{figure.name:32} {figure.title}" for figure in content.figures), sep="\n")
             return 0
         if figure:
-            write_file(into, figure_image(find_figure(content.figures, figure), image_format))
+            write_file(output, figure_image(find_figure(content.figures, figure), image_format))
         else:
-            write_file(into, report_page(content, opened.database.label).encode())
+            write_file(output, report_page(content, experiment.database.label).encode())
     print(answer_text(content))
-    print(f"report: wrote {into}", file=sys.stderr)
+    print(f"report: wrote {output}", file=sys.stderr)
     return 0
 
 
@@ -99,10 +99,10 @@ def _figure_and_format(text: str) -> tuple[str, str]:
     return name, ending or FORMATS[0]
 
 
-def _write_table(content: ReportContent, given: argparse.Namespace) -> int:
-    text = TABLES[given.table](overview_table(content))
-    if given.into is None:
+def _write_table(content: ReportContent, arguments: argparse.Namespace) -> int:
+    text = TABLES[arguments.table](overview_table(content))
+    if arguments.into is None:
         print(text, end="")
     else:
-        write_file(given.into, text.encode())
+        write_file(arguments.into, text.encode())
     return 0

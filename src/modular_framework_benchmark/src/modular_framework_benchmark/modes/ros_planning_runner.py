@@ -29,7 +29,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_problems import MotionProblem, read_problem
-from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
+from modular_framework_planning.planning_interface.planning_request import PlanningResult
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
@@ -174,7 +174,7 @@ def _status(code: ErrorCode) -> EpisodeStatus:
             return EpisodeStatus.FAILED
 
 
-def _figures(problem: MotionProblem, response: PlanningAnswer, settings: PlanningSettings) -> dict[Figure, float]:
+def _figures(problem: MotionProblem, response: PlanningResult, settings: PlanningSettings) -> dict[Figure, float]:
     """Returns the figures of `metrics.planning`; the clearance only on request, because it takes seconds."""
     figures = {PLANNING_TIME: response.total_time_s, SEARCH_TIME: response.planning_time_s}
     if "clearance" in settings.metrics:
@@ -188,7 +188,7 @@ def _motion(trajectory: Trajectory) -> Motion:
     return Motion(trajectory.joint_names, times, trajectory.positions_at(times))
 
 
-def _clearance(problem: MotionProblem, response: PlanningAnswer) -> float:
+def _clearance(problem: MotionProblem, response: PlanningResult) -> float:
     """Returns the minimum distance of the checked pairs along the motion [m]."""
     motion, model = response.trajectory, problem.request.scene.model
     checker = DEFAULT_CHECKER(problem.request.scene, model.group(problem.request.group).indices)

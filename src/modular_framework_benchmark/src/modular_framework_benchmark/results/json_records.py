@@ -23,10 +23,10 @@ def to_json(value: Any) -> str:
     Raises:
         TypeError: The value contains something other than JSON and NumPy values, enumerations, paths and data classes.
     """
-    return json.dumps(value, sort_keys=True, default=_plain, separators=(",", ":"))
+    return json.dumps(value, sort_keys=True, default=_to_json_value, separators=(",", ":"))
 
 
-def _plain(value: Any) -> Any:
+def _to_json_value(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if is_dataclass(value):

@@ -36,7 +36,7 @@ def prepare_interpreter() -> None:
 
 
 @contextlib.contextmanager
-def keeping_the_interpreter() -> Iterator[None]:
+def hold_interpreter() -> Iterator[None]:
     """Lets the calling thread keep the interpreter during a cycle, unless the thread waits.
 
     A waiting thread requests the interpreter after the current switch interval. Without this context, a cycle beside a

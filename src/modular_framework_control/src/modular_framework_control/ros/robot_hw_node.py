@@ -18,8 +18,8 @@ from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.realtime.cycle_pacer import CyclePacer, LoopStatistics
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.realtime.scheduling import (
+    hold_interpreter,
     keep_processors_awake,
-    keeping_the_interpreter,
     leave_real_time,
     prepare_interpreter,
     run_in_real_time,
@@ -168,7 +168,7 @@ class RobotHwNode:
             pacer = CyclePacer(self._period_s)
 
             def cycle(late_s: float, missed: int) -> bool:
-                with keeping_the_interpreter():
+                with hold_interpreter():
                     return self._cycle(manager, self._loop_time.now(), late_s, missed, pacer.woken_late_s)
 
             pacer.run(cycle)

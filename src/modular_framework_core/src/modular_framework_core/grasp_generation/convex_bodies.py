@@ -19,7 +19,7 @@ from modular_framework_urdf.robot import Box, Cylinder, MeshFile, PlacedShapes, 
 Array = npt.NDArray[np.float64]
 
 ROUND_SIDES = 24
-PARALLEL = 1e-9
+MIN_SLOPE = 1e-9
 MESH_TOLERANCE_M = 1.0e-3
 """Maximum distance of the convex body from the hull of its mesh; limits the number of faces of rounded meshes."""
 
@@ -92,23 +92,23 @@ def collision_body(collision: PlacedShapes) -> ConvexBody:
             raise ShapeError(f"is {other.tag!r}; allowed: box, cylinder, sphere, mesh")
 
 
-def column_fronts(planes: Array, columns: Array, margin: float) -> Array:
+def max_z_on_lines(planes: Array, lines_xy: Array, margin: float) -> Array:
     """Computes the maximum z of convex bodies on lines parallel to z.
 
     Args:
         planes: Faces of n bodies with m faces each, shape (n, m, 4); see ConvexBody.
-        columns: x and y of the lines, shape (k, 2) [m].
+        lines_xy: x and y of the lines, shape (k, 2) [m].
         margin: Distance by which each face is moved outwards before the computation [m].
 
     Returns:
         Maximum z, shape (n, k) [m]; -inf if a line misses the body.
     """
-    level = planes[:, :, :2] @ columns.T + planes[:, :, 3:] - margin  # (n, m, k); inside: level + normal_z z <= 0
+    level = planes[:, :, :2] @ lines_xy.T + planes[:, :, 3:] - margin  # (n, m, k); inside: level + normal_z z <= 0
     slope = planes[:, :, 2:3]
-    bound = -level / np.where(np.abs(slope) > PARALLEL, slope, 1.0)
-    high = np.where(slope > PARALLEL, bound, np.inf).min(axis=1)
-    low = np.where(slope < -PARALLEL, bound, -np.inf).max(axis=1)
-    beside = ((np.abs(slope) <= PARALLEL) & (level > 0.0)).any(axis=1)
+    bound = -level / np.where(np.abs(slope) > MIN_SLOPE, slope, 1.0)
+    high = np.where(slope > MIN_SLOPE, bound, np.inf).min(axis=1)
+    low = np.where(slope < -MIN_SLOPE, bound, -np.inf).max(axis=1)
+    beside = ((np.abs(slope) <= MIN_SLOPE) & (level > 0.0)).any(axis=1)
     return np.where(beside | (low > high), -np.inf, high)
 
 

@@ -20,7 +20,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
     ConvexBody,
     ShapeError,
     collision_body,
-    column_fronts,
+    max_z_on_lines,
 )
 from modular_framework_core.grasp_generation.hand_axes import hand_axes
 from modular_framework_urdf.planning_groups import KinematicTree
@@ -137,7 +137,7 @@ class GripperGeometry:
                 continue
             near = top[top[:, 2] > floor - float(part.corners[samples, :, 2].max()) - 2 * margin]
             if len(near):
-                fronts = column_fronts(part.planes[samples], near[:, :2], margin)
+                fronts = max_z_on_lines(part.planes[samples], near[:, :2], margin)
                 heights = np.maximum(heights, (fronts + near[:, 2]).max(axis=1))
         return heights
 

@@ -36,7 +36,7 @@ class ObstacleClearance:
         corners = np.concatenate([part.corners.reshape(-1, 3) for part in gripper.parts])
         self._radius = float(np.linalg.norm(corners, axis=1).max())
 
-    def of_grasp(
+    def grasp_clearance(
         self, position: Array, hand_axes: Array, openings: tuple[float, float], approach_distance_m: float
     ) -> float:
         """Returns the distance between the hand and the nearest obstacle, at most the limit [m]; 0 in collision.

@@ -95,7 +95,7 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
         )
         if pose is None:
             continue
-        clearance = surroundings.of_grasp(
+        clearance = surroundings.grasp_clearance(
             pose.position, pose.axes, (pose.opening, pose.width), settings.hand.approach_distance_m
         )
         if clearance > 0.0:

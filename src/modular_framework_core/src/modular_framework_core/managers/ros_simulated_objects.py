@@ -44,14 +44,14 @@ def remove_deleted_objects(remove_missing: Callable[[Collection[str]], list[str]
         rospy.loginfo("%s: '%s' is no longer in the simulation and was removed", store, removed)
 
 
-def new_movable_objects(known: Collection[str]) -> list[str]:
+def new_movable_objects(excluded_ids: Collection[str]) -> list[str]:
     """Returns the objects of the planning scene that are movable models of the simulation.
 
     Static models such as tables are excluded, because a request without object names must not allow collisions with
     them. Returns an empty list if the parameter ``simulation`` is not true.
 
     Args:
-        known: Object IDs to exclude.
+        excluded_ids: Object IDs to exclude.
 
     Returns:
         Object IDs in the planning scene, ``<model>__<link>``.
@@ -73,7 +73,7 @@ def new_movable_objects(known: Collection[str]) -> list[str]:
     movable = []
     for name in ids:
         model, separator, _link = name.rpartition(LINK_SEPARATOR)
-        if separator and name not in known:
+        if separator and name not in excluded_ids:
             properties_request = GetModelPropertiesRequest(model_name=model)
             properties = call_service(get_properties, properties_request, SERVICE_TIMEOUT_S)
             if properties.success and not properties.is_static:

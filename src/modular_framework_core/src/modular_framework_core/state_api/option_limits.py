@@ -62,12 +62,12 @@ class Limits:
         violated = (name for name, bound in self.bounds().items() if not _BOUNDS[name][0](number, bound))
         return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in violated), "")
 
-    def describe(self, what: str) -> str:
-        """Returns a description of the range; ``what`` is "a number" or "a whole number"."""
+    def describe(self, noun: str) -> str:
+        """Returns a description of the range; ``noun`` is "a number" or "a whole number"."""
         parts = [f"{name.replace('_', ' ')} {bound:g}" for name, bound in self.bounds().items()]
         if not parts:
-            return what.replace("a ", "a finite ", 1)
-        return f"{what} {'of ' if parts[0].startswith('at') else ''}{' and '.join(parts)}"
+            return noun.replace("a ", "a finite ", 1)
+        return f"{noun} {'of ' if parts[0].startswith('at') else ''}{' and '.join(parts)}"
 
     def schema(self) -> dict[str, float]:
         """Returns the range as JSON Schema keywords."""

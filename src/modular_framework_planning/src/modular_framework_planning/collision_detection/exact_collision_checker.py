@@ -106,7 +106,7 @@ class ExactCollisionChecker:
         """Counters of checks, see the protocol CountsChecks."""
         return self._compiled.world.counts
 
-    def most_refusals(self) -> Refusals | None:
+    def most_frequent_contact(self) -> Refusals | None:
         """Returns the two bodies that touched in the most checks, or None if no bodies touched."""
         refusals = self._compiled.world.refusals
         pair = int(refusals.argmax()) if len(refusals) else -1

@@ -44,7 +44,7 @@ STARTS_PER_BATCH = 4
 MIN_BATCHES = 8  # tried even after the timeout, so that a busy machine does not report reachable poses as unreachable
 MAX_FRUITLESS_BATCHES = 32  # the numeric search ends after this number of consecutive batches without a new solution
 MAX_SOLUTIONS, MAX_REDUNDANT_SOLUTIONS = 16, 8  # limits of the numeric search
-MAX_APPROACHED = 4  # solutions of a redundant chain that are moved closer to the seed
+MAX_SEED_APPROACHES = 4  # solutions of a redundant chain that are moved closer to the seed
 
 
 class InverseKinematics:
@@ -295,7 +295,7 @@ class InverseKinematics:
             return []
         rows = solutions[np.argsort(np.linalg.norm(solutions - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
-            rows = self._approached(problem, rows)
+            rows = self._with_copies_near_seed(problem, rows)
         if rows.shape[1] > min(6, len(self.group.joints)):
             rows = rows[:, : len(self.group.joints)]  # removes the columns of a ball joint
             distances = np.linalg.norm(rows - problem.seed[: rows.shape[1]], axis=1)
@@ -308,9 +308,9 @@ class InverseKinematics:
         return list(result)
 
     @staticmethod
-    def _approached(problem: _Problem, rows: Array) -> Array:
+    def _with_copies_near_seed(problem: _Problem, rows: Array) -> Array:
         """Adds copies of the best solutions of a redundant chain, moved closer to the seed; sorts by seed distance."""
-        approached = rows[:MAX_APPROACHED].copy()
+        approached = rows[:MAX_SEED_APPROACHES].copy()
         for values in approached:
             approach_seed(
                 problem.chain,

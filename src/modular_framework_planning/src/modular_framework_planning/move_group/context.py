@@ -13,7 +13,7 @@ from modular_framework_planning.move_group.node_settings import MotionSettings
 from modular_framework_planning.move_group.pipeline_parameters import PipelineSet
 from modular_framework_planning.move_group.planning_report import Reporter
 from modular_framework_planning.planning_interface.collision_checker import CollisionCheckerFactory
-from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import PlanningRequest, PlanningResult
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -32,7 +32,7 @@ class MoveGroupContext:
     settings: MotionSettings
     new_checker: CollisionCheckerFactory
 
-    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+    def plan(self, request: PlanningRequest) -> PlanningResult:
         """Plans with the requested or default pipeline.
 
         Raises:

@@ -14,8 +14,8 @@ from modular_framework_planning.errors import ErrorCode, ModelError, PlanningErr
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.robot_parameters import load_planning_limits
 from modular_framework_planning.planning_interface.planning_request import (
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     SamplingSettings,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
@@ -82,7 +82,7 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
     def __len__(self) -> int:
         return len(self._loaded)
 
-    def plan(self, request: PlanningRequest) -> PlanningAnswer:
+    def plan(self, request: PlanningRequest) -> PlanningResult:
         """Plans with the requested pipeline; seeded requests are planned in a worker process."""
         pipeline = self.choose(request.pipeline_id)
         request = self._with_launch_seed(request)

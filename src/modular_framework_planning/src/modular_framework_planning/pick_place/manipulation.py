@@ -31,7 +31,7 @@ from modular_framework_planning.pick_place.settings import PickPlaceSettings
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
-from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningRequest, PlanningResult
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
@@ -155,7 +155,7 @@ class ManoeuvrePlanner:
     def __init__(
         self,
         arm: Arm,
-        plan: Callable[[PlanningRequest], PlanningAnswer],
+        plan: Callable[[PlanningRequest], PlanningResult],
         request: PlanningRequest,
         *,
         contact_tolerance_m: float,

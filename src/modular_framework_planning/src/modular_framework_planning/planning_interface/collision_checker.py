@@ -140,6 +140,6 @@ class CountsChecks(Protocol):
         """Counts since the creation of the checker, see `compiled_collision.CHECK_COUNTS`; updated in place."""
         ...
 
-    def most_refusals(self) -> Refusals | None:
+    def most_frequent_contact(self) -> Refusals | None:
         """Returns the pair of bodies that touched in most checks, or None."""
         ...

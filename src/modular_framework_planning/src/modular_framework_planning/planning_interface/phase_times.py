@@ -79,4 +79,4 @@ class PhaseTimes:
             if checked:
                 undecided = checked - free - touching
                 counts[phase] = CheckCounts(checked, free, touching, undecided, exactly, states)
-        return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run, processor_s)
+        return PlanStatistics(dict(self.seconds), counts, self._checker.most_frequent_contact(), self.run, processor_s)

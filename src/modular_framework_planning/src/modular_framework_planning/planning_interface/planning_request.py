@@ -233,7 +233,7 @@ class PlanningRequest:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlanningAnswer:
+class PlanningResult:
     """A validated motion.
 
     Attributes:

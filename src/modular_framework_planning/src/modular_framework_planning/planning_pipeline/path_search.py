@@ -55,7 +55,7 @@ class PathSearch:
         if simplify and problem.constraints is not None:
             vertices = _shortened(problem, vertices, _cut_along_constraints)
         if simplify:
-            vertices = _shortened(problem, vertices, _short)
+            vertices = _shortened(problem, vertices, _shortened_path)
         self._path = replace(path, vertices=vertices)
         return self._path
 
@@ -99,7 +99,7 @@ def _shortened(
         return shorten_path(problem, path, math.inf if problem.repeatable else limit)
 
 
-def _short(problem: PlanningProblem, path: Array, deadline: float) -> Array:
+def _shortened_path(problem: PlanningProblem, path: Array, deadline: float) -> Array:
     return shortened(problem, path, deadline, problem.rng)
 
 

@@ -30,8 +30,8 @@ from modular_framework_planning.planning_interface.planner_configurations import
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_link_speed import (
@@ -115,7 +115,7 @@ class PlanningPipeline:
         check = getattr(self._planner, "parameter_faults", None)
         return list(check(planner_id, parameters)) if check else []
 
-    def plan(self, request: PlanningRequest, repeatable: bool = False) -> PlanningAnswer:
+    def plan(self, request: PlanningRequest, repeatable: bool = False) -> PlanningResult:
         """Returns a validated motion, never a partial result.
 
         Args:
@@ -135,7 +135,7 @@ class PlanningPipeline:
                 raise PlanningError(code, error.reason, error.contacts, error.statistics) from error
             raise
 
-    def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningAnswer:
+    def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningResult:
         """Searches and repairs until a motion passes the final validation or the time is over."""
         start_s = time.monotonic()
         with phases.measured(SETUP):
@@ -182,7 +182,7 @@ class PlanningPipeline:
 
     def _checked(
         self, problem: PlanningProblem, path: PlannedPath, start_s: float
-    ) -> tuple[str, PlanningAnswer | None]:
+    ) -> tuple[str, PlanningResult | None]:
         if path.trajectory is None:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
@@ -194,7 +194,7 @@ class PlanningPipeline:
             return fault, None
         start = problem.start.copy()
         start[problem.group.indices] = path.vertices[0]
-        return "", PlanningAnswer(
+        return "", PlanningResult(
             trajectory=path.trajectory,
             start=start,
             goal=problem.motion.full_positions(path.vertices[-1]),

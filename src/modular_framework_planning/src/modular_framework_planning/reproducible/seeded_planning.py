@@ -17,7 +17,7 @@ from multiprocessing.connection import Client, Connection
 from pathlib import Path
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import PlanningRequest, PlanningResult
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
@@ -51,7 +51,7 @@ class SeededPlanning:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._address = ""
 
-    def plan(self, pipeline: PlanningPipeline, request: PlanningRequest, seed: int) -> PlanningAnswer:
+    def plan(self, pipeline: PlanningPipeline, request: PlanningRequest, seed: int) -> PlanningResult:
         """Plans in a new process; equal requests, scenes and seeds give equal trajectories.
 
         Args:

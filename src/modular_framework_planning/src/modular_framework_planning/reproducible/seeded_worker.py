@@ -29,8 +29,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
@@ -102,7 +102,7 @@ def _child(connection: Connection, model: RobotModel, pipelines: dict[str, Plann
     os._exit(0)
 
 
-def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> PlanningAnswer | PlanningError:
+def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> PlanningResult | PlanningError:
     import ompl.util as ou
 
     try:

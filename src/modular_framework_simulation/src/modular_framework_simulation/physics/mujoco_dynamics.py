@@ -35,7 +35,7 @@ and the fraction of a penetration that is corrected in one step, which are 0 for
 
 _LIMIT, _MOTOR = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
 _WELD = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-_SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+_ONE_DOF_TYPES = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 """Types of joints with one degree of freedom."""
 
 _DISABLED = (
@@ -60,7 +60,7 @@ class SavedDynamics:
     """Copy of MuJoCo's state and of all values per degree of freedom."""
 
     physics: Array
-    by_dof: tuple[Array, ...]
+    values_per_dof: tuple[Array, ...]
 
 
 class Contacts(NamedTuple):
@@ -112,7 +112,7 @@ class MujocoDynamics:
         self.motor_velocities, self.motor_targets, self.motor_gains, self.motor_efforts = np.zeros((4, model.nv))
         self.measures_loads = False
         self._forces, self._torques = np.zeros((2, model.nbody, 3))
-        single = np.isin(model.jnt_type, _SINGLE)
+        single = np.isin(model.jnt_type, _ONE_DOF_TYPES)
         self._single_dofs, self._single_positions = model.jnt_dofadr[single], model.jnt_qposadr[single]
         self._outdated = True
         self._contacts: Contacts | None = None
@@ -284,7 +284,7 @@ class MujocoDynamics:
         tx, ty, tz = (-self._torques[body]).tolist()
         return (fx, fy, fz), (tx, ty, tz)
 
-    def by_dof(self) -> tuple[Array, ...]:
+    def values_per_dof(self) -> tuple[Array, ...]:
         """Returns all values per degree of freedom except positions: motion, efforts, resistance and motors."""
         data, model = self.data, self.model
         motors = (self.motor_velocities, self.motor_targets, self.motor_gains, self.motor_efforts)
@@ -295,12 +295,12 @@ class MujocoDynamics:
         size = mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION)
         physics = np.zeros(size)
         mujoco.mj_getState(self.model, self.data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
-        return SavedDynamics(physics, tuple(values.copy() for values in self.by_dof()))
+        return SavedDynamics(physics, tuple(values.copy() for values in self.values_per_dof()))
 
     def set_state(self, state: SavedDynamics) -> None:
         """Restores a saved state of this model."""
         mujoco.mj_setState(self.model, self.data, state.physics, mujoco.mjtState.mjSTATE_INTEGRATION)
-        for target, source in zip(self.by_dof(), state.by_dof, strict=True):
+        for target, source in zip(self.values_per_dof(), state.values_per_dof, strict=True):
             target[:] = source
         self.data.ncon = 0
         self._contacts = None

@@ -467,7 +467,7 @@ def _copy_motion(old: MujocoDynamics, body: _Body, new: MujocoDynamics, ids: lis
     """
     for old_span, new_span in zip(body.spans, spans, strict=True):
         new.data.qpos[new_span.positions] = old.data.qpos[old_span.positions]
-        for target, source in zip(new.by_dof(), old.by_dof(), strict=True):
+        for target, source in zip(new.values_per_dof(), old.values_per_dof(), strict=True):
             target[new_span.dofs] = source[old_span.dofs]
     new.data.xfrc_applied[ids] = old.data.xfrc_applied[body.ids]
 

@@ -22,8 +22,8 @@ from modular_framework_planning.planners.stomp.planner import StompPlanner
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
-    PlanningAnswer,
     PlanningRequest,
+    PlanningResult,
     PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
@@ -163,7 +163,7 @@ def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Pr
 
 
 def violations(
-    model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningAnswer, scaling: float
+    model: RobotModel, checker: IndependentChecker, problem: Problem, answer: PlanningResult, scaling: float
 ) -> list[str]:
     """Returns the properties that a motion lacks, on the curve of a controller sampled every 1 ms.
 

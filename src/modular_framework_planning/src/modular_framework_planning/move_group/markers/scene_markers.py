@@ -20,7 +20,7 @@ from modular_framework_planning.geometry.shapes import Box, Cone, Cylinder, Mesh
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
+from modular_framework_planning.planning_interface.planning_request import PlanningResult
 from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_ros.publishing import PicturePublisher, publish
@@ -74,7 +74,7 @@ class MarkerPublisher:
                 _paint(markers[-1], scene.colors.get(held.name, ATTACHED_COLOR))
         return MarkerArray(markers)
 
-    def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
+    def show_path(self, scene: PlanningScene, response: Any, answer: PlanningResult) -> None:
         """Publishes a planned motion: the path of the tip as a line, and the hand at the end of the motion.
 
         Args:
@@ -86,7 +86,7 @@ class MarkerPublisher:
         group = scene.model.group(response.group_name)
         self._path.show(lambda: self._path_markers(scene.model, group, answer))
 
-    def _path_markers(self, model: RobotModel, group: JointGroup, answer: PlanningAnswer) -> MarkerArray:
+    def _path_markers(self, model: RobotModel, group: JointGroup, answer: PlanningResult) -> MarkerArray:
         rows = answer.trajectory.positions
         line = _tip_line(model, group.tip_link or group.links[-1], group.indices, rows, answer.start)
         end = answer.start.copy()

@@ -20,7 +20,7 @@ from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.blending import appended, blend
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
-from modular_framework_planning.planning_interface.planning_request import PlanningAnswer, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import PlanningRequest, PlanningResult
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -49,7 +49,7 @@ class PlannedItem:
     """A planned motion of a sequence."""
 
     request: PlanningRequest
-    answer: PlanningAnswer
+    answer: PlanningResult
     blend_radius: float
 
 
@@ -67,7 +67,7 @@ class SequencePart:
     scene: PlanningScene
     group: JointGroup
     trajectory: Trajectory
-    answers: tuple[PlanningAnswer, ...]
+    answers: tuple[PlanningResult, ...]
 
 
 def checked_radii(items: Sequence[ItemSpec]) -> tuple[list[float], list[str]]:
