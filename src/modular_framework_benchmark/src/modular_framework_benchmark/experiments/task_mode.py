@@ -224,7 +224,7 @@ def _sound_arguments(
     for name in given:
         if name not in known:
             what = f"the argument of {launch}"
-            reading.faults.add_unknown(locations[name], what, name, sorted(known), given=given)
+            reading.faults.add_unknown(locations[name], what, name, sorted(known), used=given)
             meant = intended_key(name, [free for free in known if free not in given])
             if meant is not None:
                 sound[meant] = given[name]

@@ -19,7 +19,7 @@ def planners_by_pipeline(timeout_s: float = SERVICE_TIMEOUT_S, group: str = "") 
 
     Args:
         timeout_s: Maximum wait for the service [s of real time].
-        group: Planning group, whose own configurations are included; "" for those of all groups.
+        group: Planning group, whose own configurations are included; "" for the configurations of all groups.
 
     Raises:
         CallError: The service is absent or does not answer.
@@ -27,6 +27,9 @@ def planners_by_pipeline(timeout_s: float = SERVICE_TIMEOUT_S, group: str = "") 
     proxy = rospy.ServiceProxy(PLANNERS_SERVICE, QueryPlannerInterfaces)
     wait_for_service(proxy, timeout_s)
     response = call_service(proxy, QueryPlannerInterfacesRequest(), SERVICE_TIMEOUT_S)
-    own = re.compile(rf"(?:(?:{re.escape(group) if group else '.*?'})\[(.*)\]|([^\]]*))")  # GROUP[PLANNER] or PLANNER
-    found = {item.pipeline_id: map(own.fullmatch, item.planner_ids) for item in response.planner_interfaces}
-    return {name: {match[1] or match[2] for match in matches if match} for name, matches in found.items()}
+    # GROUP[PLANNER] or PLANNER
+    pattern = re.compile(rf"(?:(?:{re.escape(group) if group else '.*?'})\[(.*)\]|([^\]]*))")
+    return {
+        pipeline.pipeline_id: {match[1] or match[2] for match in map(pattern.fullmatch, pipeline.planner_ids) if match}
+        for pipeline in response.planner_interfaces
+    }

@@ -72,7 +72,7 @@ class FaultList:
         """Number of faults that do not affect the known states and userdata of the task."""
 
     def add(self, location: SourceLocation, message: str) -> None:
-        """Adds a fault, unless a fault added with ``add_cause`` at the same location explains it."""
+        """Adds a fault, except at the location of a fault added by ``add_cause``, which is the cause."""
         if location not in self._explained:
             self._faults.append(Fault(location, message))
 
@@ -82,20 +82,20 @@ class FaultList:
         self._explained.add(location)
 
     def add_unknown(
-        self, location: SourceLocation, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
+        self, location: SourceLocation, noun: str, found: str, allowed: Iterable[str], used: Container[str] = ()
     ) -> None:
         """Adds a fault for an unknown name, with a similar allowed name as a suggestion.
 
         Args:
             location: Position of the name.
-            what: Noun phrase for the named thing.
+            noun: Noun phrase for the name, such as ``outcome``.
             found: Unknown name.
             allowed: Allowed names.
-            given: Names already used at this place, which are not suggested.
+            used: Names that are already used in the same mapping, and are therefore not suggested.
         """
         names = list(dict.fromkeys(allowed))
-        unused = [name for name in names if name not in given]
-        self.add(location, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, unused)}")
+        unused = [name for name in names if name not in used]
+        self.add(location, f"{noun} '{found}' is unknown; {listing(names)}{nearest(found, unused)}")
 
     def extend(self, other: FaultList) -> None:
         """Adds the faults of another list."""

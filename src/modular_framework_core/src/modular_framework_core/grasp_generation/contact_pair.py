@@ -78,12 +78,12 @@ def distinct_pairs(pairs: Iterable[ContactPair], rules: PairRules) -> list[Conta
         pairs: Pairs, best first; the first of several duplicates is kept.
         rules: Spacings of distinct pairs.
     """
-    kept: list[ContactPair] = []
+    distinct: list[ContactPair] = []
     middles, axes = np.zeros((0, 3)), np.zeros((0, 3))
     min_cosine = math.cos(rules.spacing_rad)
     for pair in pairs:
         near = np.linalg.norm(middles - pair.middle, axis=1) < rules.spacing_m
         if not (near & (np.abs(axes @ pair.axis) > min_cosine)).any():
-            kept.append(pair)
+            distinct.append(pair)
             middles, axes = np.vstack([middles, pair.middle]), np.vstack([axes, pair.axis])
-    return kept
+    return distinct

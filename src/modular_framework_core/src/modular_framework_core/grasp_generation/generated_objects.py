@@ -15,23 +15,23 @@ REST_M = 0.001
 """Maximum displacement of a surface point of an object at rest between two readings of the scene."""
 
 
-def same_place(one: SceneObject, other: SceneObject, tolerance_m: float) -> bool:
+def same_place(first: SceneObject, second: SceneObject, tolerance_m: float) -> bool:
     """Returns whether two readings of an object have the same surface points within a tolerance.
 
     Args:
-        one: First reading.
-        other: Second reading.
+        first: First reading.
+        second: Second reading.
         tolerance_m: Maximum displacement of a point along an axis [m].
     """
-    if one.name != other.name or one.surface.points.shape != other.surface.points.shape:
+    if first.name != second.name or first.surface.points.shape != second.surface.points.shape:
         return False
-    return bool(np.abs(one.surface.points - other.surface.points).max() <= tolerance_m)
+    return bool(np.abs(first.surface.points - second.surface.points).max() <= tolerance_m)
 
 
 def at_rest(before: Sequence[SceneObject], now: Sequence[SceneObject]) -> bool:
     """Returns whether two readings of the scene contain the same objects at the same poses."""
     return len(before) == len(now) and all(
-        same_place(one, other, REST_M) for one, other in zip(before, now, strict=True)
+        same_place(earlier, later, REST_M) for earlier, later in zip(before, now, strict=True)
     )
 
 
@@ -42,17 +42,18 @@ class GeneratedObjects:
         self._objects: dict[str, SceneObject] = {}
 
     def mark(self, objects: Iterable[SceneObject]) -> None:
-        """Marks the generation for objects at their current poses as finished, with or without grasps."""
-        self._objects.update({found.name: found for found in objects})
+        """Stores the objects and their current poses after a generation, which may have found no grasps."""
+        self._objects.update({scene_object.name: scene_object for scene_object in objects})
 
     def keep(self, names: Collection[str]) -> None:
         """Forgets all other objects; an object that reappears under the same name then counts as new."""
-        self._objects = {name: found for name, found in self._objects.items() if name in names}
+        self._objects = {name: scene_object for name, scene_object in self._objects.items() if name in names}
 
     def stale(self, objects: Iterable[SceneObject]) -> list[SceneObject]:
         """Returns the objects that are new or have moved."""
         return [
-            found
-            for found in objects
-            if found.name not in self._objects or not same_place(found, self._objects[found.name], MOVED_M)
+            scene_object
+            for scene_object in objects
+            if scene_object.name not in self._objects
+            or not same_place(scene_object, self._objects[scene_object.name], MOVED_M)
         ]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Computes opening and convex parts of a two-finger gripper per joint position, from the robot description.
 
-The pads are identified by their motion, not by names or the kinematic tree. Of all pairs of moving parts that face each
-other, the pads are the innermost pair among those whose gap changes most over the stroke. The innermost parts alone are
-no criterion: in a four-bar finger they can be knuckles whose gap hardly changes (Robotiq 2F-85).
+The pads are identified by their motion, not by names or the kinematic tree. Among the pairs of facing moving parts
+whose gap changes most over the stroke, the pads are the innermost pair. The innermost parts alone are no criterion: in
+a four-bar finger they can be knuckles whose gap hardly changes (Robotiq 2F-85).
 """
 
 from __future__ import annotations

@@ -195,7 +195,7 @@ class GraspGenerator:
             with self._generating:
                 objects = self._objects(settings, kept)
                 if kept is not Kept.NONE and self._may_stay(objects, kept):
-                    names = sorted(found.name for found in objects)
+                    names = sorted(target.name for target in objects)
                     return TriggerResponse(True, f"nothing has moved; the grasps of {names} stay")
                 return TriggerResponse(*self._signal_grasps(settings, objects))
         except (NoGraspError, CallError, CommanderError, ParameterError) as error:
@@ -204,8 +204,8 @@ class GraspGenerator:
 
     def _may_stay(self, objects: list[SceneObject], kept: Kept) -> bool:
         """Returns whether no object has moved and the manager still has the grasps that a request keeps."""
-        needed = self._stored.count if kept is Kept.COMPLETE else 1
-        return not self._generated.stale(objects) and self._stored.left() >= max(1, needed)
+        required_count = self._stored.count if kept is Kept.COMPLETE else 1
+        return not self._generated.stale(objects) and self._stored.left() >= max(1, required_count)
 
     def _objects(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
         """Returns the objects to grasp; waits until they are at rest, at most the timeout, except for `Kept.NONE`.
@@ -289,18 +289,18 @@ class GraspGenerator:
         found_in: list[list[tuple[SceneObject, GraspCandidate]]] = []
         causes: list[str] = []
         present = self._scene.read()
-        for found in objects:
-            support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
-            obstacles = tuple(other for other in present if other.name != found.name)
-            query = GraspQuery(found, obstacles, support, self._gripper, settings.seed)
+        for target in objects:
+            support = max(target.bottom, settings.crop.low[2]) if settings.crop.holds(target.centre) else target.bottom
+            obstacles = tuple(other for other in present if other.name != target.name)
+            query = GraspQuery(target, obstacles, support, self._gripper, settings.seed)
             try:
-                found_in.append([(found, candidate) for candidate in self._method.candidates(query)])
+                found_in.append([(target, candidate) for candidate in self._method.candidates(query)])
             except NoCandidatesError as error:
                 causes.append(str(error))
         ranked = list(heapq.merge(*found_in, key=lambda pair: -pair[1].quality))
         if not ranked:
             raise NoGraspError(
-                f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: "
+                f"no part of {'; '.join(_sides(target) for target in objects)} can be grasped {self._method.manner}: "
                 + ("; ".join(causes) or self._usual_cause())
             )
         figures[CANDIDATES] = len(ranked)
@@ -318,8 +318,8 @@ class GraspGenerator:
         chosen: list[StandardisedGrasp] = []
         reasons: Counter[str] = Counter()
         tried = ranked[: settings.max_checks]
-        for found, candidate in tried:
-            message = self._message(found, candidate, settings)
+        for target, candidate in tried:
+            message = self._message(target, candidate, settings)
             reach = check_reach(self._commander, message) if settings.check_reachability else Reach("")
             if reach.reason:
                 reasons[reach.reason] += 1
@@ -331,14 +331,16 @@ class GraspGenerator:
         if settings.check_reachability:
             figures |= {CHECKED: len(chosen) + reasons.total(), REACHABLE: len(chosen)}
         if not chosen:
-            names = sorted({found.name for found, _ in tried})
+            names = sorted({target.name for target, _ in tried})
             raise NoGraspError(
                 f"no grasp of {names} is reachable: all {len(tried)} checked grasps fail, most often because "
                 f"{reasons.most_common(1)[0][0]}"
             )
         return sorted(chosen, key=lambda message: -message.grasp_quality)
 
-    def _message(self, found: SceneObject, candidate: GraspCandidate, settings: GeneratorSettings) -> StandardisedGrasp:
+    def _message(
+        self, target: SceneObject, candidate: GraspCandidate, settings: GeneratorSettings
+    ) -> StandardisedGrasp:
         orientation = (Rotation.from_matrix(candidate.hand_axes) * Rotation.from_matrix(self._gripper.axes.T)).as_quat()
         poses = [
             generate_pose_stamped_message(settings.frame, position.tolist(), orientation.tolist())
@@ -354,13 +356,13 @@ class GraspGenerator:
             *poses,
             grasp_quality=candidate.quality,
             hand_id=settings.hand_id,
-            object_id=found.name,
+            object_id=target.name,
         )
 
 
-def _sides(found: SceneObject) -> str:
-    lengths = found.surface.points.max(axis=0) - found.surface.points.min(axis=0)
-    return f"'{found.name}' with the sides {' x '.join(f'{length:.3f}' for length in lengths)} m"
+def _sides(target: SceneObject) -> str:
+    lengths = target.surface.points.max(axis=0) - target.surface.points.min(axis=0)
+    return f"'{target.name}' with the sides {' x '.join(f'{length:.3f}' for length in lengths)} m"
 
 
 def run_grasp_generator(name: str, method: GraspMethod) -> int:

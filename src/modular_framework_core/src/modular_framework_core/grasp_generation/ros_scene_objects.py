@@ -61,19 +61,19 @@ class SceneObjects:
         """
         objects = self.read()
         if settings.object_name:
-            named = [found for found in objects if is_named(found.name, settings.object_name)]
+            named = [candidate for candidate in objects if is_named(candidate.name, settings.object_name)]
             if not named:
                 raise NoObjectError(
                     f"the planning scene has no object '{settings.object_name}'; "
-                    f"it has {sorted(found.name for found in objects)}"
+                    f"it has {sorted(candidate.name for candidate in objects)}"
                 )
             return named
-        inside = [found for found in objects if settings.crop.holds(found.centre)]
+        inside = [candidate for candidate in objects if settings.crop.holds(candidate.centre)]
         if not inside:
             raise NoObjectError(
                 f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
                 f"frame '{settings.frame}'; there are "
-                f"{[_place(found) for found in objects] or 'no objects'}"
+                f"{[_place(candidate) for candidate in objects] or 'no objects'}"
             )
         return inside
 
@@ -93,15 +93,15 @@ class SceneObjects:
         objects = []
         known: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
         for message in answer.scene.world.collision_objects:
-            before, found = self._known.get(message.id, (None, None))
+            last_message, converted = self._known.get(message.id, (None, None))
             try:
-                if message != before:
-                    found = scene_object(message)
-                known[message.id] = message, found
+                if message != last_message:
+                    converted = scene_object(message)
+                known[message.id] = message, converted
             except (SceneObjectError, ValueError) as error:
                 rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is skipped.")
                 continue
-            objects += [found] if found is not None else []
+            objects += [converted] if converted is not None else []
         self._known = known
         return objects
 
@@ -110,6 +110,6 @@ def _describe(crop: CropBox) -> str:
     return ", ".join(f"{axis} {low} to {high}" for axis, low, high in zip("xyz", crop.low, crop.high, strict=True))
 
 
-def _place(found: SceneObject) -> str:
-    x, y, z = found.centre
-    return f"{found.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+def _place(target: SceneObject) -> str:
+    x, y, z = target.centre
+    return f"{target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"

@@ -93,19 +93,19 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
     return targets
 
 
-def _paired(what: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
-    """Returns values by joint name; errors name the message part `what` and the kind of values."""
+def _paired(label: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
+    """Returns values by joint name; errors name the message part `label` and the kind of values."""
     if len(names) != len(values):
         raise GraspCommandError(
-            f"{what} has {len(names)} joint names and {len(values)} {kind}; the numbers must be equal"
+            f"{label} has {len(names)} joint names and {len(values)} {kind}; the numbers must be equal"
         )
     if len(set(names)) != len(names):
-        raise GraspCommandError(f"{what} contains a joint twice: {list(names)}; list each joint once")
+        raise GraspCommandError(f"{label} contains a joint twice: {list(names)}; list each joint once")
     for name in names:
         try:
             group.joint(name)
         except RobotModelError as error:
-            raise GraspCommandError(f"{what}: {error}") from error
+            raise GraspCommandError(f"{label}: {error}") from error
     return {name: float(value) for name, value in zip(names, values, strict=True)}
 
 

@@ -117,8 +117,8 @@ class GraspServer:
         if now_s < self._last_s:  # reset of the simulation: discard the evidence of earlier motions
             self._evidence = StallEvidence(self._tolerance)
         self._last_s = now_s
-        begun = self._manipulator.joint_state(targets)
-        attempt = Attempt(dict(zip(begun.name, begun.position, strict=True)), targets, efforts)
+        start_state = self._manipulator.joint_state(targets)
+        attempt = Attempt(dict(zip(start_state.name, start_state.position, strict=True)), targets, efforts)
         outcome = self._evidence.judge(self._move(handle, motion), attempt)
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
 

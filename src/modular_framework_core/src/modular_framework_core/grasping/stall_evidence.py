@@ -18,18 +18,18 @@ class Attempt:
     """Commanded motion of the fingers.
 
     Attributes:
-        begun: Joint positions before the motion, by name [rad or m].
+        start_positions: Joint positions before the motion, by name [rad or m].
         targets: Commanded joint positions, by name [rad or m].
         efforts: Effort limits by joint name [Nm or N]; for other joints, the controller chooses the effort.
     """
 
-    begun: Mapping[str, float]
+    start_positions: Mapping[str, float]
     targets: Mapping[str, float]
     efforts: Mapping[str, float]
 
     def direction(self, joint: str) -> float:
         """Returns the direction of the commanded motion of a joint, 1.0 or -1.0."""
-        return math.copysign(1.0, self.targets[joint] - self.begun.get(joint, self.targets[joint]))
+        return math.copysign(1.0, self.targets[joint] - self.start_positions.get(joint, self.targets[joint]))
 
     def effort(self, joint: str) -> float:
         """Returns the effort limit of a joint; infinite if the controller chooses the effort."""
@@ -83,13 +83,13 @@ class StallEvidence:
     def _still_holds(self, attempt: Attempt) -> bool:
         held = self._held
         return held is not None and all(
-            abs(held.positions.get(name, math.inf) - attempt.begun.get(name, math.inf)) <= self._tolerance
+            abs(held.positions.get(name, math.inf) - attempt.start_positions.get(name, math.inf)) <= self._tolerance
             for name in attempt.targets
         )
 
     def _was_stopped(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
         if (
-            name not in attempt.begun
+            name not in attempt.start_positions
             or name not in outcome.positions
             or (abs(attempt.targets[name] - outcome.positions[name]) <= self._tolerance)
         ):
@@ -99,9 +99,9 @@ class StallEvidence:
         )
 
     def _moved(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
-        if name not in attempt.begun or name not in outcome.positions:
+        if name not in attempt.start_positions or name not in outcome.positions:
             return False
-        distance = attempt.direction(name) * (outcome.positions[name] - attempt.begun[name])
+        distance = attempt.direction(name) * (outcome.positions[name] - attempt.start_positions[name])
         return distance > MOVED_FRACTION * self._tolerance
 
     def _remember(self, outcome: Outcome, attempt: Attempt) -> None:

@@ -31,7 +31,7 @@ PORTS = range(12000, 32000)
 def free_port() -> int:
     """Returns a free TCP port of the loopback interface.
 
-    The system assigns no port of `PORTS` by itself, so no node that starts meanwhile gets the port.
+    The operating system never assigns a port of `PORTS` to a node, so the port stays free until the master starts.
     """
     for port in random.SystemRandom().sample(PORTS, len(PORTS)):
         with socket.socket() as probe, contextlib.suppress(OSError):
@@ -48,17 +48,17 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
         value: Value of the variable.
         prefix: Whether `value` is a prefix of the variable's value.
     """
-    mark, found = f"{variable}={value}".encode(), set()
+    mark, process_ids = f"{variable}={value}".encode(), set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # process ended or belongs to another user
             entries = (folder / "environ").read_bytes().split(b"\0")
             marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
             if marked and int(folder.name) != os.getpid():
-                found.add(int(folder.name))
-    parents = {process.pid: process.info["ppid"] for process in psutil.process_iter(["ppid"])} if found else {}
-    while children := {process_id for process_id, parent in parents.items() if parent in found} - found:
-        found |= children
-    return sorted(found - {os.getpid()})
+                process_ids.add(int(folder.name))
+    parents = {process.pid: process.info["ppid"] for process in psutil.process_iter(["ppid"])} if process_ids else {}
+    while children := {process_id for process_id, parent in parents.items() if parent in process_ids} - process_ids:
+        process_ids |= children
+    return sorted(process_ids - {os.getpid()})
 
 
 def kill_processes_with(variable: str, value: str, prefix: bool = False, timeout_s: float = math.inf) -> int:

@@ -66,7 +66,7 @@ class DeclaredNames:
         self._trees = [f"{name}/" for name, users in self.known.items() if any(item.tree for _, item in users)]
 
     def _declarations(self) -> Iterator[tuple[LaunchedNode, NodeDeclaration | None]]:
-        """Yields each node with its declaration, and each hardware, named by its namespace, with its class's."""
+        """Yields each node with its declaration, and each hardware namespace with the declaration of its class."""
         for node in self._launch.nodes:
             declared = node_declaration(node.package, node.executable)
             yield node, declared
@@ -75,13 +75,13 @@ class DeclaredNames:
     def _hardware_declarations(
         self, node: LaunchedNode, declared: NodeDeclaration
     ) -> Iterator[tuple[LaunchedNode, NodeDeclaration]]:
-        """Yields the hardware of a node; hardware without a declaration may read any further parameter."""
+        """Yields the hardware of a node; hardware without a declaration may read any parameter."""
         types = {part: self._launch.parameters.get(f"{part}/type", "") for part in self._hardware_of(node, declared)}
         default = [item.default for item in declared.parameters.values() if item.names == "hardware" and item.default]
         for part, kind in (types or dict.fromkeys([node.name], *default) if default else types).items():
             package, _, name = str(kind).partition("/")
-            own = node_declaration(package, name) if name else None
-            yield replace(node, name=part), own or replace(existing_declaration(*HARDWARE), closed=False)
+            declaration = node_declaration(package, name) if name else None
+            yield replace(node, name=part), declaration or replace(existing_declaration(*HARDWARE), closed=False)
 
     def _hardware_of(self, node: LaunchedNode, declared: NodeDeclaration | None) -> Iterator[str]:
         """Yields the namespace of each hardware of a node."""
@@ -91,7 +91,7 @@ class DeclaredNames:
                 yield from [f"{node.namespace}{part}" for part in value] if isinstance(value, list) else [node.name]
 
     def hardware(self) -> Iterator[str]:
-        """Yields the namespace of each hardware of the launch; its class is the parameter `type` there."""
+        """Yields the namespace of each hardware of the launch; the parameter `type` in this namespace is the class."""
         for node in self._launch.nodes:
             yield from self._hardware_of(node, node_declaration(node.package, node.executable))
 
@@ -108,16 +108,16 @@ class DeclaredNames:
             text = f"no node of the launch reads the parameter '{name}'{self._hint(name)}"
             yield LaunchFault(name, f"{text}; list it in extra_parameters if a node of your own reads it")
 
-    def below_trees(self, given: Mapping[str, Any], robot: Mapping[str, Collection[str]]) -> Iterator[LaunchFault]:
+    def below_trees(self, parameters: Mapping[str, Any], robot: Mapping[str, Collection[str]]) -> Iterator[LaunchFault]:
         """Yields a fault for each parameter in a tree with an unknown name or an invalid value.
 
         Args:
-            given: Parameters by resolved name.
+            parameters: Parameters by resolved name.
             robot: Names of the robot by kind: joint, link, group. Names of an absent kind are not checked.
         """
         for tree, users in self.known.items():
             below = next((item.below for _, item in users if item.below), "")
-            for name, value in leaves(given).items() if below else ():
+            for name, value in leaves(parameters).items() if below else ():
                 if name.startswith(f"{tree}/"):
                     fault = tree_fault(
                         name.removeprefix(f"{tree}/"), value, existing_declaration(*below.split("/")), robot
@@ -156,13 +156,13 @@ class DeclaredNames:
         parts = name.removeprefix(parent).split("/")
         for known in (*self.known, *self._trees):
             declared = known.removeprefix(parent).rstrip("/").split("/")
-            rest = parts[len(declared) :]
-            is_comparable = len(declared) <= min(len(parts), max_parts) and (not rest or known.endswith("/"))
+            remaining_parts = parts[len(declared) :]
+            is_comparable = len(declared) <= min(len(parts), max_parts) and (not remaining_parts or known.endswith("/"))
             if not known.startswith(parent) or not is_comparable:
                 continue
             differing = [(part, other) for part, other in zip(parts, declared, strict=False) if part != other]
             if len(differing) == 1 and misspelling(*differing[0]):
-                return parent + "/".join([*declared, *rest])
+                return parent + "/".join([*declared, *remaining_parts])
         return ""
 
     def wrong_values(self) -> Iterator[LaunchFault]:

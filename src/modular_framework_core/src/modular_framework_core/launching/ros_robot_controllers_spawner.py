@@ -182,24 +182,24 @@ class RobotControllersSpawner:
             if status.name.endswith(LOOP_STATUS):
                 self._faults[status.name] = next((value.value for value in status.values if value.key == "fault"), "")
 
-    def _wait(self, done: Callable[[], bool], what: Callable[[], str], advice: str) -> None:
+    def _wait(self, done: Callable[[], bool], describe_event: Callable[[], str], advice: str) -> None:
         """Polls a condition in wall time, warns every `~timeout` and gives up after `~give_up_after`.
 
         Args:
             done: Condition.
-            what: Function that returns the awaited event in words.
+            describe_event: Function that returns a description of the awaited event.
             advice: Advice to the user if no hardware fault is known.
         """
         started = warned = time.monotonic()
         while not done():
             now, cause = time.monotonic(), "; ".join(filter(None, self._faults.values()))
             if rospy.is_shutdown():
-                raise SpawnError(f"shut down while waiting for {what()}")
+                raise SpawnError(f"shut down while waiting for {describe_event()}")
             if now - started > self._give_up_after_s:
-                raise SpawnError(f"waited {now - started:.0f} s for {what()} in vain; {cause or advice}")
+                raise SpawnError(f"waited {now - started:.0f} s for {describe_event()} in vain; {cause or advice}")
             if now - warned > self._warn_after_s:
                 warned = now
-                rospy.logwarn("still waiting for %s after %.0f s; %s", what(), now - started, cause or advice)
+                rospy.logwarn("still waiting for %s after %.0f s; %s", describe_event(), now - started, cause or advice)
             time.sleep(0.05)
 
 

@@ -216,7 +216,7 @@ class AcmManager:
         with self._lock:
             if self._initial is None or self._table is None:
                 return frozenset()
-            names, reference = self._table.names, self._initial.rows  # the table begins with those entries
+            names, reference = self._table.names, self._initial.rows  # the table begins with the reference entries
             return frozenset(
                 frozenset((names[i], names[j]))
                 for i, row in enumerate(self._table.rows)

@@ -17,7 +17,7 @@ def position_fault(message: Any, where: str = "") -> str:
 
     Args:
         message: Message whose joint positions, points and orientations are checked at any depth.
-        where: Path of the message's own field, for the returned text.
+        where: Path to the message inside the outermost message, for the returned text; "" for the outermost message.
     """
     if message._type == "sensor_msgs/JointState":
         for name in ("position", "velocity", "effort"):

@@ -152,14 +152,14 @@ def _split_triplets(arguments: Sequence[str]) -> list[str]:
     return result
 
 
-def _triplet(what: str, values: Sequence[str] | Sequence[float]) -> tuple[float, float, float]:
+def _triplet(noun: str, values: Sequence[str] | Sequence[float]) -> tuple[float, float, float]:
     try:
         numbers = [float(value) for value in values]
     except ValueError as error:
-        raise ObjectRequestError(f"the {what} is {list(values)}, expected three numbers: {error}") from error
+        raise ObjectRequestError(f"the {noun} is {list(values)}, expected three numbers: {error}") from error
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise ObjectRequestError(
-            f"the {what} has the values {numbers}, expected three finite numbers separated by spaces or commas"
+            f"the {noun} has the values {numbers}, expected three finite numbers separated by spaces or commas"
         )
     return (numbers[0], numbers[1], numbers[2])
 

@@ -101,28 +101,28 @@ class _Lines:
         line_number, line = self._lines[self._next - 1]
         return SceneFileError(f"{self._path}:{line_number}: got '{line[:60]}', expected {expected}")
 
-    def numbers(self, count: int, what: str) -> Vector:
-        expected = f"{what} ({count} finite number{'s' if count > 1 else ''})"
-        words = self.next_line(expected).split()
+    def numbers(self, count: int, noun: str) -> Vector:
+        expected = f"{noun} ({count} finite number{'s' if count > 1 else ''})"
+        fields = self.next_line(expected).split()
         try:
-            values = tuple(float(word) for word in words)
+            values = tuple(float(field) for field in fields)
         except ValueError as error:
             raise self.fault(expected) from error
         if len(values) != count or not all(map(math.isfinite, values)):
             raise self.fault(expected)
         return values
 
-    def counts(self, count: int, what: str) -> tuple[int, ...]:
-        values = self.numbers(count, what)
+    def counts(self, count: int, noun: str) -> tuple[int, ...]:
+        values = self.numbers(count, noun)
         if any(value < 0 or value != int(value) for value in values):
-            raise self.fault(f"{what} (nonnegative integers)")
+            raise self.fault(f"{noun} (nonnegative integers)")
         return tuple(int(value) for value in values)
 
-    def quaternion(self, what: str) -> Vector:
-        values = self.numbers(4, what)
+    def quaternion(self, noun: str) -> Vector:
+        values = self.numbers(4, noun)
         norm = math.hypot(*values)
         if abs(norm - 1.0) > 1e-2:
-            raise self.fault(f"{what} as a unit quaternion x y z w; the norm is {norm:.4g}")
+            raise self.fault(f"{noun} as a unit quaternion x y z w; the norm is {norm:.4g}")
         return tuple(value / norm for value in values)
 
 
@@ -232,9 +232,9 @@ def scene_text(scene: Scene, old_layout: bool = False) -> str:
     return "\n".join([*lines, ".", ""])
 
 
-def _name(name: str, what: str) -> str:
+def _name(name: str, noun: str) -> str:
     if not name.strip() or len(name.splitlines()) != 1:
-        raise SceneFileError(f"name of the {what}: got '{name}', expected one nonempty line; rename it")
+        raise SceneFileError(f"name of the {noun}: got '{name}', expected one nonempty line; rename it")
     return name
 
 

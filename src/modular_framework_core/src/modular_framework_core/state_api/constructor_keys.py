@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the outcomes and userdata keys that a state's constructor fixes, from the source.
+"""Reads from the source the outcomes and userdata keys that a state's constructor fixes.
 
 A framework state takes ``outcomes``, ``input_keys``, ``output_keys`` and ``io_keys`` as options and passes them on
 unchanged, most simply as ``**keys: Unpack[StateKeys]``. A plain smach state fixes them::

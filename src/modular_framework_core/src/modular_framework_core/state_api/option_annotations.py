@@ -45,7 +45,7 @@ def from_hint(hint: Any) -> OptionType:
 
 
 def uses_in(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> tuple[Use, ...]:
-    """Returns the declared uses in an annotation; the arguments are those of ``from_annotation``."""
+    """Returns the uses that an annotation declares; see ``from_annotation`` for the arguments."""
     return tuple(dict.fromkeys(_uses(annotation, aliases, frozenset())))
 
 

@@ -18,34 +18,34 @@ _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
 
-def text(node: Node, what: str, faults: FaultList) -> str | None:
+def text(node: Node, label: str, faults: FaultList) -> str | None:
     """Returns a nonempty text.
 
     Args:
         node: Value of the field.
-        what: Name of the field, for messages.
+        label: Name of the field, for messages.
         faults: Receives the faults.
     """
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
         return node.value
-    faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
+    faults.add(node.location, f"{label} must be a text, found {kind_of(node)}")
     return None
 
 
-def identifier(node: Node, what: str, faults: FaultList) -> str | None:
+def identifier(node: Node, label: str, faults: FaultList) -> str | None:
     """Returns a text that is a valid name of a Python module and class.
 
     Args:
         node: Value of the field.
-        what: Name of the field, for messages.
+        label: Name of the field, for messages.
         faults: Receives the faults.
     """
-    name = text(node, what, faults)
+    name = text(node, label, faults)
     if name is None:
         return None
     fault = module_name_fault(name)
     if fault:
-        faults.add(node.location, f"{what} '{name}' {fault}")
+        faults.add(node.location, f"{label} '{name}' {fault}")
     return None if fault else name
 
 
@@ -88,53 +88,53 @@ def label(name: str, location: SourceLocation, faults: FaultList) -> None:
 
 
 def names(
-    node: Node, what: str, faults: FaultList, *, may_be_empty: bool = False, example: str = "[success, fail]"
+    node: Node, label: str, faults: FaultList, *, may_be_empty: bool = False, example: str = "[success, fail]"
 ) -> tuple[str, ...] | None:
     """Returns a list of distinct names.
 
     Args:
         node: Value of the field.
-        what: Name of the field, for messages.
+        label: Name of the field, for messages.
         faults: Receives the faults.
         may_be_empty: Whether the list may be empty.
         example: Valid value, for messages.
     """
     if not isinstance(node, Sequence):
-        faults.add(node.location, f"{what} must be a list such as {example}, found {kind_of(node)}")
+        faults.add(node.location, f"{label} must be a list such as {example}, found {kind_of(node)}")
         return None
     if not node.items and not may_be_empty:
-        faults.add(node.location, f"{what} is an empty list; it needs at least one name")
+        faults.add(node.location, f"{label} is an empty list; it needs at least one name")
         return None
     result: list[str] = []
     for item in node.items:
-        name = text(item, f"each of {what}", faults)
+        name = text(item, f"each of {label}", faults)
         if name is None:
             return None
         if name in result:
-            faults.add(item.location, f"{what} has '{name}' twice")
+            faults.add(item.location, f"{label} has '{name}' twice")
             return None
         result.append(name)
     return tuple(result)
 
 
 def name_map(
-    node: Node, what: str, faults: FaultList, *, example: str = "{success: NextState}"
+    node: Node, label: str, faults: FaultList, *, example: str = "{success: NextState}"
 ) -> dict[str, Scalar] | None:
     """Returns a mapping from names to names, with the location of each value.
 
     Args:
         node: Value of the field.
-        what: Name of the field, for messages.
+        label: Name of the field, for messages.
         faults: Receives the faults.
         example: Valid value, for messages.
     """
     if not isinstance(node, Mapping):
-        faults.add(node.location, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
+        faults.add(node.location, f"{label} must be a mapping such as {example}, found {kind_of(node)}")
         return None
     result: dict[str, Scalar] = {}
     for key, value in node.entries.items():
         if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             result[key] = value
         else:
-            faults.add(value.location, f"{what}: the value of '{key}' must be a name, found {kind_of(value)}")
+            faults.add(value.location, f"{label}: the value of '{key}' must be a name, found {kind_of(value)}")
     return result if len(result) == len(node.entries) else None

@@ -30,13 +30,13 @@ def value_of(node: Mapping, key: str) -> Node | None:
     return next((value for written, value in node.entries.items() if intended_key(written, [key])), None)
 
 
-def corrected_keys(node: Mapping, known: Collection[str], what: str, faults: FaultList) -> Mapping:
+def corrected_keys(node: Mapping, known: Collection[str], noun: str, faults: FaultList) -> Mapping:
     """Returns a mapping with known keys only: misspelt keys are corrected, other unknown keys are dropped.
 
     Args:
         node: Mapping as written.
         known: Allowed keys.
-        what: Noun phrase for a key, for messages.
+        noun: Noun phrase for a key, for messages.
         faults: Receives a fault for each unknown key.
     """
     entries = {key: value for key, value in node.entries.items() if key in known}
@@ -44,7 +44,7 @@ def corrected_keys(node: Mapping, known: Collection[str], what: str, faults: Fau
     for key, value in node.entries.items():
         if key in known:
             continue
-        faults.add_unknown(node.keys[key], what, key, known, given=entries)
+        faults.add_unknown(node.keys[key], noun, key, known, used=entries)
         intended = intended_key(key, [name for name in known if name not in entries])
         if intended is not None:
             entries[intended], keys[intended] = value, node.keys[key]

@@ -59,11 +59,11 @@ def check_sequential(machine: MachineLinks, faults: FaultList) -> None:
         for outcome, target in transitions.items():
             if child.outcomes is not None and outcome not in child.outcomes:
                 faults.add_unknown(
-                    child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes, given=transitions
+                    child.keys[outcome], f"state '{child.label}': outcome", outcome, child.outcomes, used=transitions
                 )
             if outcomes is not None and target.value not in targets:
-                what = f"state '{child.label}': transition target"
-                faults.add_unknown(target.location, what, str(target.value), targets)
+                noun = f"state '{child.label}': transition target"
+                faults.add_unknown(target.location, noun, str(target.value), targets)
         if child.transitions is None or outcomes is None:
             continue
         missing = [name for name in child.outcomes or () if name not in transitions and name not in outcomes]
@@ -146,7 +146,7 @@ def check_outcomes_produced(
 
     Args:
         outcomes: Outcomes of the machine.
-        produced: Labels and outcomes with a link to them.
+        produced: Labels and outcomes that a transition or outcome map leads to.
         location: Position of the outcomes.
         faults: Receives the faults.
     """
@@ -189,7 +189,7 @@ def check_outcome_map(
     result: dict[str, dict[str, str]] = {}
     for outcome, conditions in node.entries.items():
         if outcome not in outcomes:
-            faults.add_unknown(node.keys[outcome], "outcome_map: outcome", outcome, outcomes, given=node.entries)
+            faults.add_unknown(node.keys[outcome], "outcome_map: outcome", outcome, outcomes, used=node.entries)
         if not isinstance(conditions, Mapping):
             faults.add(
                 conditions.location,
@@ -202,7 +202,7 @@ def check_outcome_map(
             child = by_label.get(label)
             if child is None:
                 faults.add_unknown(
-                    conditions.keys[label], "outcome_map: state", label, by_label, given=conditions.entries
+                    conditions.keys[label], "outcome_map: state", label, by_label, used=conditions.entries
                 )
             elif not isinstance(value, str):
                 faults.add(

@@ -47,11 +47,11 @@ class HeaderReader:
                 key.name for item in templates for key in machine_keys(item) if (key.at_root if is_root else key.nested)
             )
         )
-        who = f"'{label}' (template {template.name})" if template else f"'{label}'"
-        corrected = corrected_keys(header, known, f"{who}: key", self._faults)
+        machine_label = f"'{label}' (template {template.name})" if template else f"'{label}'"
+        corrected = corrected_keys(header, known, f"{machine_label}: key", self._faults)
         for key in required_keys(is_root=is_root):
             if key.name not in corrected.entries:
-                owner = "the task" if is_root else f"machine {who}"
+                owner = "the task" if is_root else f"machine {machine_label}"
                 self._faults.add(header.location, f"{owner} has no '{key.name}'; add it: {key.form}")
         return corrected
 

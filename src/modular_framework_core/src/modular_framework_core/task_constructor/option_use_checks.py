@@ -54,13 +54,13 @@ def names_used(root: MachineSpec, kind: str) -> tuple[str, ...]:
         root: Outermost machine.
         kind: Kind of name, such as planner.
     """
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for state in root.leaf_states():
         for option in state.source.options.values():
             if any(isinstance(use, Named) and use.kind == kind and not use.made for use in option.uses):
                 value = state.options.get(option.name, option.default)
-                found |= dict.fromkeys(str(name) for name in (value if isinstance(value, list) else [value]) if name)
-    return tuple(found)
+                names |= dict.fromkeys(str(name) for name in (value if isinstance(value, list) else [value]) if name)
+    return tuple(names)
 
 
 class _Checker:
@@ -102,8 +102,8 @@ class _Checker:
             case Key(direction=direction, name=key, when=when):
                 if not value or (when and value not in (when, [when])):
                     return
-                needed = str(value) if not key else key.format(kind_of(str(value)))
-                self._need(direction, needed, f"option '{name}' {value!r}", location)
+                userdata_key = str(value) if not key else key.format(kind_of(str(value)))
+                self._need(direction, userdata_key, f"option '{name}' {value!r}", location)
             case Fields() if node is not None:
                 for location, text in _references(node):
                     self._need("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", location)
@@ -113,8 +113,8 @@ class _Checker:
             case OutcomeNames() if isinstance(node, Mapping) and self._state.outcomes:
                 for key in node:
                     if key not in self._state.outcomes:
-                        what = f"state '{self._state.label}': {name}: outcome"
-                        self._faults.add_unknown(node.keys[key], what, key, self._state.outcomes, given=node.entries)
+                        noun = f"state '{self._state.label}': {name}: outcome"
+                        self._faults.add_unknown(node.keys[key], noun, key, self._state.outcomes, used=node.entries)
 
     def _check_name(self, use: Named, option: str, node: Node | None) -> None:
         kind_word = self._kind_word(use.kind)
@@ -134,9 +134,9 @@ class _Checker:
                 self._faults.add(item.location, self._unknown(option, kind, name, names))
 
     def _unknown(self, option: str, kind: str, name: str, names: Collection[str]) -> str:
-        word = _NON_MESSAGE_KINDS.get(kind, kind.replace("_", " "))
+        noun = _NON_MESSAGE_KINDS.get(kind, kind.replace("_", " "))
         text = (
-            f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
+            f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {noun} '{name}' is "
             f"unknown; {listing(sorted(names), 'there is none')}"
         )
         origin = self._known.origins.get(kind, "" if kind == PLANNER else "the manager's file")
@@ -155,7 +155,7 @@ class _Checker:
             return kind
         return str(self._state.options.get(kind.removeprefix("option:"), ""))
 
-    def _need(self, direction: str, key: str, what: str, location: SourceLocation, key_list: str = "") -> None:
+    def _need(self, direction: str, key: str, user: str, location: SourceLocation, key_list: str = "") -> None:
         declared = self._inputs if direction == "input" else self._outputs
         if declared is None or key in declared:
             return
@@ -164,7 +164,7 @@ class _Checker:
         key_place = f"{key_list} in {source.file.name}" if key_list in source.own_keys else key_list
         self._faults.add(
             location,
-            f"state '{self._state.label}' ({source.name}): {what} {verb} the userdata key "
+            f"state '{self._state.label}' ({source.name}): {user} {verb} the userdata key "
             f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
             f"add it to {key_place}",
         )

@@ -42,8 +42,8 @@ class StateBuilder:
             body = corrected_keys(body, [*_RESERVED, *other_keys], f"state '{label}': key", self._faults)
         else:
             free = [key for key in body.entries if source.takes_any_option and _is_argument(key)]
-            what = f"state '{label}' ({source.name}): key"
-            body = corrected_keys(body, [*_RESERVED, *source.options, *free], what, self._faults)
+            noun = f"state '{label}' ({source.name}): key"
+            body = corrected_keys(body, [*_RESERVED, *source.options, *free], noun, self._faults)
         if "source" not in body.entries:
             self._faults.add(
                 body.location, f"state '{label}' has no 'source'; add it: the name of a state's file, or of a template"
@@ -77,16 +77,16 @@ class StateBuilder:
             return None, None
         own_options = {key: value for key, value in body.entries.items() if key not in _RESERVED}
         options = {**self._options_from_params(label, body, scope, source), **own_options}
-        what = f"state '{label}' ({source.name}): option"
+        label_text = f"state '{label}' ({source.name}): option"
         faults_before = len(self._faults)
         self._check_imports(label, body, source)
         for option in source.options.values():
             if option.required and option.name not in options:
-                self._faults.add(location, f"{what} '{option.name}' is missing; it has no default")
+                self._faults.add(location, f"{label_text} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
                 fault = option_fault(option.type, options[option.name])
                 if fault is not None:
-                    self._faults.add(fault[0].location, f"{what} '{option.name}' {fault[1]}")
+                    self._faults.add(fault[0].location, f"{label_text} '{option.name}' {fault[1]}")
         self._faults.harmless += len(self._faults) - faults_before
         for key in STATE_KEYS:
             if key in options:
@@ -149,8 +149,8 @@ class StateBuilder:
             if key in source.options or source.takes_any_option:
                 options[key] = scope.resolve(value, FaultList())
             elif key not in scope.used:
-                what = f"state '{label}' ({source.name}): params: option"
-                self._faults.add_unknown(params.keys[key], what, key, source.options, given=body.entries)
+                noun = f"state '{label}' ({source.name}): params: option"
+                self._faults.add_unknown(params.keys[key], noun, key, source.options, used=body.entries)
         return options
 
     def _state_outcomes(self, options: dict[str, Node], source: StateSource) -> tuple[str, ...] | None:

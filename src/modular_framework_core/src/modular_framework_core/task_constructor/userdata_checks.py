@@ -27,14 +27,14 @@ def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> N
     """
     if node is None:
         return
-    what = f"state '{child.label}': remapping"
-    names = header_fields.name_map(node, what, faults, example="{key_of_the_state: key_of_the_machine}")
+    label = f"state '{child.label}': remapping"
+    names = header_fields.name_map(node, label, faults, example="{key_of_the_state: key_of_the_machine}")
     known = _interface_keys(child)
     if names is None or known is None or not isinstance(node, Mapping):
         return
     for key in names:
         if key not in known:
-            faults.add_unknown(node.keys[key], f"{what}: key", key, sorted(known), given=names)
+            faults.add_unknown(node.keys[key], f"{label}: key", key, sorted(known), used=names)
 
 
 def _interface_keys(child: ChildSpec) -> set[str] | None:
@@ -78,16 +78,16 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
         misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MIN_SIMILARITY)
         if key not in provided_by and not misspelt:
             available.add(key)
-    needed: list[tuple[ChildSpec, list[str]]] = [
+    required_keys: list[tuple[ChildSpec, list[str]]] = [
         (state, [*(_remapped_keys(state, "input_keys") or ()), *(_remapped_keys(state, "io_keys") or ())])
         for state in states
     ]
-    needed += [
+    required_keys += [
         (machine_inside, [machine_inside.remapping.get(key, key) for key in machine_inside.input_keys])
         for machine_inside in nested
         if not machine_inside.shares_userdata
     ]
-    for child, keys in needed:
+    for child, keys in required_keys:
         for key in dict.fromkeys(keys):
             if key not in available:
                 text = f"{_missing_key(machine, child, key, available)}; {_source(machine, is_root, key, provided_by)}"
@@ -102,7 +102,7 @@ def _missing_key(machine: MachineSpec, child: ChildSpec, key: str, available: It
 
 
 def _source(machine: MachineSpec, is_root: bool, key: str, provided_by: dict[str, str]) -> str:
-    """Returns where a missing key can come from."""
+    """Returns the remedy for a missing key."""
     if not is_root:
         return f"'userdata: self.userdata' in the header of '{machine.label}' shares the enclosing machine's keys"
     if key in provided_by:
