@@ -77,7 +77,7 @@ def test_a_gain_that_is_no_number_is_refused_and_named(robot: Any) -> None:
     for number in (math.nan, math.inf):
         assert client.update_configuration({"p": number})["p"] == 5.0
     until(
-        lambda: "/lift/gains/rail/p: got nan; allowed is -100000.0 to 100000.0; 5.0 stays" in robot.log(),
+        lambda: "/lift/gains/rail/p: got nan; allowed: -100000.0 to 100000.0; 5.0 stays" in robot.log(),
         "the reason in the log",
     )
 

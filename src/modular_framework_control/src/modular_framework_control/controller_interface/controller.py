@@ -40,7 +40,7 @@ class Controller:
 
     @property
     def moving(self) -> bool:
-        """Whether the controller executes a goal or stops joints; simulated time must not be paused meanwhile."""
+        """Whether the controller executes a goal or stops joints; simulated time must then not be paused."""
         return False
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:

@@ -21,7 +21,7 @@ LOGGER = logging.getLogger("rosout.controller_manager")
 class ControllerState(Enum):
     """States of a loaded controller, by their names in `list_controllers`.
 
-    A starting controller is waiting until the hardware is ready, and aborted if the hardware does not get ready.
+    A starting controller waits until the hardware is ready, and is aborted if the hardware does not become ready.
     """
 
     INITIALIZED = "initialized"
@@ -156,7 +156,7 @@ class LoadedController:
 
 @dataclass(frozen=True, slots=True)
 class SwitchPlan:
-    """A request after the rules of STRICT or BEST_EFFORT.
+    """The executable part of a request, according to the rules of STRICT or BEST_EFFORT.
 
     Attributes:
         start: Controllers to start.

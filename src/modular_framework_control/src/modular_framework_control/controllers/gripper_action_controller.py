@@ -62,10 +62,10 @@ class GripperActionController(Controller):
 
     A joint is stalled if it stays within `stall_velocity_threshold * stall_timeout` of one position for
     `stall_timeout`. This criterion bounds the mean velocity instead of the velocity of one cycle, because contacts make
-    the joint vibrate. The time counts from the start of the goal at the earliest; time with stale measurements does not
-    count, and goals are not evaluated meanwhile.
+    the joint vibrate. The time counts from the start of the goal. Goals are not evaluated while measurements are stale,
+    and this time does not count.
 
-    As in the trajectory controller, a goal beyond the known limits of the joint is refused.
+    A goal beyond the known limits of the joint is refused, as in the trajectory controller.
 
     During a hardware fault, the joint is held at its measured position, and goals are refused with the fault's reason.
     If the measured position is not a number, the goal is aborted and the joint is held at its last measured position.
@@ -240,7 +240,7 @@ class GripperActionController(Controller):
         self._active = goal
         position = self._handle.position
         if (self._command - position) * (goal.position - position) < 0.0:
-            # The velocity limit counts from the last command, which is beyond the object that the fingers held.
+            # The velocity limit is relative to the last command, which lies beyond the surface of the held object.
             self._hold()
         else:
             self._command = goal.position

@@ -38,7 +38,7 @@ class HardwarePart:
     resources: dict[str, frozenset[str]]
 
     def concerned(self, controllers: Iterable[ControllerInfo]) -> list[ControllerInfo]:
-        """Returns the controllers with claims on this part, reduced to these claims."""
+        """Returns the controllers with claims on this part, without their other claims."""
         result: list[ControllerInfo] = []
         for controller in controllers:
             claims = [
@@ -116,10 +116,10 @@ class CombinedRobotHW(RobotHW):
 
     def _raised_faults(self) -> Iterator[HardwareFault]:
         for part in self._parts:
-            for what in ("read", "write"):
-                if (part.name, what) in self._raised_errors:
+            for step_name in ("read", "write"):
+                if (part.name, step_name) in self._raised_errors:
                     yield HardwareFault(
-                        f"hardware '{part.name}': {self._raised_errors[part.name, what]}",
+                        f"hardware '{part.name}': {self._raised_errors[part.name, step_name]}",
                         part.hardware.commanded_joints,
                     )
 
@@ -170,16 +170,16 @@ class CombinedRobotHW(RobotHW):
             self._cycle(part, "write", part.hardware.write, time_s, period_s)
 
     def _cycle(
-        self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float, period_s: float
+        self, part: HardwarePart, step_name: str, step: Callable[[float, float], None], time_s: float, period_s: float
     ) -> None:
         """Reads or writes one part; an exception is a fault of this part until the same step succeeds."""
         try:
             step(time_s, period_s)
         except Exception as error:  # a user's hardware may raise anything; the other parts must continue
-            self._raised_errors[part.name, what] = f"{what}() raised {type(error).__name__}: {error}"
+            self._raised_errors[part.name, step_name] = f"{step_name}() raised {type(error).__name__}: {error}"
         else:
             if self._raised_errors:
-                self._raised_errors.pop((part.name, what), None)
+                self._raised_errors.pop((part.name, step_name), None)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         infos = list(controllers)

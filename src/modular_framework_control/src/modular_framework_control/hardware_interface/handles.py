@@ -134,12 +134,12 @@ class PosVelAccJointHandle(PosVelJointHandle):
 class ActuatorHandle:
     """One actuator of a transmission, see `RobotTransmissions`.
 
-    `RobotHW.read()` writes the measured values. Commands are computed from the joints' commands, and are NaN without
-    command.
+    `RobotHW.read()` writes the measured values. Commands are computed from the commands of the joints, and are NaN if a
+    joint has no command.
 
     Attributes:
         name: Name as in the <transmission> of the robot description.
-        position: Measured position [rad|m]; NaN until measured, and with it the positions of the joints.
+        position: Measured position [rad|m]; NaN until measured; joint positions are NaN as well until then.
         velocity: Measured velocity [rad/s|m/s].
         effort: Measured effort [Nm|N].
         command_position: Commanded position [rad|m].
@@ -183,7 +183,7 @@ class ForceTorqueSensorHandle:
         name: Name of the sensor and of its topic.
         frame_id: Frame of force and torque.
         force: Force x, y, z [N]; `RobotHW.read()` assigns a new tuple, so that readers never see mixed values.
-        torque: Torque x, y, z [Nm], assigned likewise.
+        torque: Torque x, y, z [Nm], assigned in the same way.
     """
 
     __slots__ = ("name", "frame_id", "force", "torque")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint limits from the robot description and from the parameters `joint_limits/<joint>/...`.
 
-The parameters are those of ros_control: `has_position_limits`, `min_position`, `max_position`, `angle_wraparound`,
+The parameters have the names of ros_control: `has_position_limits`, `min_position`, `max_position`, `angle_wraparound`,
 `has_velocity_limits`, `max_velocity`, `has_acceleration_limits`, `max_acceleration`, `has_effort_limits`, `max_effort`,
 and for soft limits `has_soft_limits`, `soft_lower_limit`, `soft_upper_limit`, `k_position`, `k_velocity`. As in
 ros_control, a value without `has_...: true` and an incomplete group are ignored, with a warning.

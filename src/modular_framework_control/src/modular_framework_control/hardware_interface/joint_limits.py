@@ -121,7 +121,7 @@ class PosVelJointSaturation(PositionJointSaturation):
 
 
 class _Saturation:
-    """Base class for velocity and effort limits of one joint, which stores requested and limited command.
+    """Base class for velocity and effort limits of one joint, which stores the requested and the limited command.
 
     A stopping controller commands 0 only once. The limited command that replaces this 0 must not become the request of
     the next cycle, so the 0 stays active until a controller sets a new command. For positions, in contrast, the joint
@@ -165,7 +165,8 @@ class VelocityJointSaturation(_Saturation):
 
     The limits are the maximum velocity and the maximum change from the last command, initially from the measured
     velocity. At an end of the range, only velocities back into the range are allowed, regardless of the change. With
-    soft limits, the velocity is at most `k_position` times the distance to their end. NaN becomes 0.
+    soft limits, the velocity towards an end of the soft range is at most `k_position` times the distance to this end.
+    NaN becomes 0.
     """
 
     __slots__ = ()
@@ -194,8 +195,8 @@ class EffortJointSaturation(_Saturation):
     """Saturates effort commands.
 
     The limits are the maximum effort, and 0 towards the outside for a joint outside its range or beyond its maximum
-    velocity. With soft limits, the effort is at most `k_velocity` times the difference to the velocity allowed there.
-    NaN becomes 0.
+    velocity. With soft limits, the effort is at most `k_velocity` times the difference between the velocity limit at
+    the current position and the measured velocity. NaN becomes 0.
     """
 
     __slots__ = ()
@@ -267,7 +268,7 @@ def limit_handle(
 
 
 def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
-    """Returns the known limits of joints: enforced limits, else those of `robot_description` and `joint_limits`.
+    """Returns the known limits of joints: enforced limits, else the limits in `robot_description` and `joint_limits`.
 
     Args:
         handles: Joints.

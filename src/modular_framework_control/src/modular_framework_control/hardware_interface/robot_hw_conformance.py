@@ -54,11 +54,11 @@ class RobotHWConformance(ABC):
 
     Attributes:
         period_s: Period of the control loop.
-        settle_s: Maximum time of a joint for a step of `step`.
-        ready_s: Maximum time of the hardware until it has no fault.
+        settle_s: Maximum time of a joint to move by `step`.
+        ready_s: Maximum time until the hardware has no fault.
         step: Size of the steps [rad|m].
-        jump: Size of the step for the velocity limit, smaller for joints without room; must take many cycles at the
-            maximum velocity [rad|m].
+        jump: Size of the step in the test of the velocity limit, smaller for joints near a position limit; must take
+            many cycles at the maximum velocity [rad|m].
         tolerance: Tolerance for reaching a position, and for the motion of an idle joint [rad|m].
         real_time: Whether the hardware moves in real time.
         close_after_test: Whether the hardware is closed after each test.
@@ -332,7 +332,7 @@ class RobotHWConformance(ABC):
         )
 
     def _assert_that_joints_move(self, interface: type[CommandInterface], size: Callable[[JointLimits], float]) -> None:
-        """Commands each joint by `size` of its limits towards free room, then by 0."""
+        """Commands each joint by `size` of its limits towards the position of `_target`, then by 0."""
         for robot_hw, handles, commands in self._claimed(interface):
             for handle in handles:
                 start, target = handle.position, self._target(handle, self.step)

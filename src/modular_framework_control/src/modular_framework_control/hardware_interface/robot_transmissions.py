@@ -139,8 +139,8 @@ class RobotTransmissions:
 
 def _interface(robot_hw: RobotHW, kind: type[InterfaceT]) -> InterfaceT:
     """Returns the interface of a class, registering a missing interface."""
-    found = robot_hw.find(kind)
-    if found is None:
-        found = kind()
-        robot_hw.register_interface(found)
-    return found
+    interface = robot_hw.find(kind)
+    if interface is None:
+        interface = kind()
+        robot_hw.register_interface(interface)
+    return interface

@@ -110,8 +110,8 @@ class _Reader:
         if not name:
             raise _FaultError(self._line, "<transmission> has no name; give it an attribute name")
         if kind not in (SIMPLE, DIFFERENTIAL, FOUR_BAR):
-            found = f"<type> is '{kind}'" if kind else "<type> is missing"
-            raise _FaultError(self._line, f"{self._label}: {found}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
+            fault = f"<type> is '{kind}'" if kind else "<type> is missing"
+            raise _FaultError(self._line, f"{self._label}: {fault}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
         joints = self._in_order("joint", self._transmission.joints)
         actuators = self._in_order("actuator", self._transmission.actuators)
         return TransmissionInfo(
@@ -145,10 +145,10 @@ class _Reader:
         roles = {part.role: part for part in parts}
         expected = [f"{tag}1", f"{tag}2"]
         if sorted(roles) != expected:
-            found = ", ".join(f"'{part.role}'" for part in parts)
+            role_list = ", ".join(f"'{part.role}'" for part in parts)
             raise _FaultError(
                 parts[0].line,
-                f"{self._label}: the roles of its <{tag}> are {found}; expected "
+                f"{self._label}: the roles of its <{tag}> are {role_list}; expected "
                 f"<role>{expected[0]}</role> in one and <role>{expected[1]}</role> in the other",
             )
         return [roles[role] for role in expected]

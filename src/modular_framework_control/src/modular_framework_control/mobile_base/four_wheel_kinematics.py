@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Forward and inverse kinematics of a base with four steered wheels.
 
-The order of the wheels is front left, front right, rear left, rear right. Each wheel steers about a vertical axis and
-is mounted outside this axis at a distance of `steering_offset`.
+The order of the wheels is front left, front right, rear left, rear right. Each wheel steers about a vertical axis, and
+is mounted at the distance `steering_offset` from this axis, away from the base's centre.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ class MobileBaseController(Controller, ABC):
             self._drive(command if is_measured else None, time_s, period_s)
 
     def _report(self, time_s: float) -> bool:
-        """Publishes the odometry if due; returns whether it was due."""
+        """Publishes the odometry if a message is due; returns whether a message was due."""
         settings, pose = self.settings, self.odometry
         if self._schedule is None or settings.publish_rate != self._schedule.rate:
             self._schedule = Schedule(settings.publish_rate)
@@ -234,7 +234,7 @@ class MobileBaseController(Controller, ABC):
 
     @abstractmethod
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        """Commands the joints for a command to the base, or for coming to rest within the limits if None.
+        """Commands the joints for a command to the base; without a command, the base comes to rest within its limits.
 
         Args:
             command: Active command, or None.
@@ -301,21 +301,21 @@ def read_positive(handle: NodeHandle, key: str, default: float) -> float:
     return value
 
 
-def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
+def read_name(handle: NodeHandle, key: str, default: str, noun: str) -> str:
     """Reads a parameter with a name.
 
     Args:
         handle: Namespace of the parameter.
         key: Name of the parameter.
         default: Value of an unset parameter.
-        what: Kind of named object, for the error message.
+        noun: Kind of named object, for the error message.
 
     Raises:
         ParameterError: The value is not a string or is empty.
     """
     value = handle.get_param(key, default)
     if not isinstance(value, str) or not value:
-        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a {what}'s name")
+        raise ParameterError(f"parameter {join_names(handle.namespace, key)}: got {value!r}; expected a {noun}'s name")
     return value
 
 

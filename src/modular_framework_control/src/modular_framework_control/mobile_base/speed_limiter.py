@@ -58,31 +58,32 @@ class SpeedLimiter:
 
 
 def read_speed_limiter(limits_nh: NodeHandle) -> SpeedLimiter:
-    """The limits below `linear/x` or `angular/z`.
+    """Returns the limits below `linear/x` or `angular/z`.
 
-    `has_velocity_limits`, `max_velocity`, `min_velocity` (default minus the largest), likewise `..._acceleration` and
-    `..._jerk`.
+    Parameters: `has_velocity_limits`, `max_velocity`, `min_velocity` (default: the negative maximum), and the
+        corresponding parameters of `acceleration` and `jerk`.
 
     Raises:
         ParameterError: An enabled limit has no maximum, or its range does not contain 0.
     """
-    return SpeedLimiter(*(_range(limits_nh, what) for what in ("velocity", "acceleration", "jerk")))
+    return SpeedLimiter(*(_range(limits_nh, quantity) for quantity in ("velocity", "acceleration", "jerk")))
 
 
-def _range(limits_nh: NodeHandle, what: str) -> tuple[float, float]:
-    switch, largest, smallest = f"has_{what}_limits", f"max_{what}", f"min_{what}"
+def _range(limits_nh: NodeHandle, quantity: str) -> tuple[float, float]:
+    switch, largest, smallest = f"has_{quantity}_limits", f"max_{quantity}", f"min_{quantity}"
     if not read_bool(limits_nh, switch, False):
         return UNLIMITED
     where = join_names(limits_nh.namespace, largest)
     if not limits_nh.has_param(largest):
         raise ParameterError(
-            f"parameter {where} is not set although {switch} is true; set the maximum {what}, or set {switch} to false"
+            f"parameter {where} is not set although {switch} is true; set the maximum {quantity}, "
+            f"or set {switch} to false"
         )
     highest = read_number(limits_nh, largest, 0.0, None)
     lowest = read_number(limits_nh, smallest, -highest, None)
     if not lowest <= 0.0 <= highest:
         raise ParameterError(
-            f"parameters {where} and {smallest}: got {highest} and {lowest}; the maximum {what} must "
+            f"parameters {where} and {smallest}: got {highest} and {lowest}; the maximum {quantity} must "
             "be at least 0 and the minimum at most 0, so that the base can stop"
         )
     return lowest, highest

@@ -21,7 +21,7 @@ class WheelGeometry:
 
     Args:
         root_nh: Namespace of `robot_description`.
-        parameter: Name of the parameter that replaces the description, for error messages.
+        parameter: Name of the controller parameter that overrides the description, for error messages.
 
     Raises:
         ParameterError: The description is missing or not XML.

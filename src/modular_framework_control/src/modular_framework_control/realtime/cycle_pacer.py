@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 RESOLUTION_S = 5e-6
 NO_PROCESSOR_S = 1e-3
-"""Wake-up latency from which the loop counts as without processor (or without Python's interpreter) [s]."""
+"""Minimum wake-up latency at which the loop counts as waiting for a processor or for Python's interpreter [s]."""
 _BUCKETS = 4000
 
 

@@ -33,7 +33,7 @@ class RealtimeGoalHandle(Generic[ResultT]):
 
     Attributes:
         status: Status of the goal.
-        result: Result, set together with a final status.
+        result: Result of the goal; None before a final status.
         text: Reason for the end of the goal, for users.
     """
 

@@ -27,7 +27,7 @@ class ControllerConnection:
         name: Absolute name of the controller.
         outbox: Thread that publishes for the control loop.
         loop_time: Offset between the stamps of messages and the time of the control loop.
-        opened: Everything that is open; closing the stack closes the connection.
+        opened: Open topics, actions and services; closing the stack closes the connection.
     """
 
     namespace: str

@@ -66,11 +66,13 @@ def plan_group(groups: Groups, group: str, states: Mapping[str, str]) -> GroupPl
         raise ControllerManagerClientError(
             f"no controllers are defined for group '{group}'; known groups: {', '.join(sorted(groups))}"
         )
-    wanted = tuple(dict.fromkeys(groups[group]))
-    other_controllers = dict.fromkeys(name for names in groups.values() for name in names if name not in wanted)
+    group_controllers = tuple(dict.fromkeys(groups[group]))
+    other_controllers = dict.fromkeys(
+        name for names in groups.values() for name in names if name not in group_controllers
+    )
     return GroupPlan(
-        tuple(name for name in wanted if name not in states),
-        tuple(name for name in wanted if states.get(name) != "running"),
+        tuple(name for name in group_controllers if name not in states),
+        tuple(name for name in group_controllers if states.get(name) != "running"),
         tuple(name for name in other_controllers if states.get(name) == "running"),
     )
 

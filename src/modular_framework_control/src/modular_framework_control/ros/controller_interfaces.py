@@ -213,7 +213,7 @@ def attach_ros(
         loop_time: Offset between the stamps of messages and the time of the control loop.
 
     Returns:
-        Callback that closes all of them.
+        Callback that closes all topics, actions, services and servers.
     """
     with contextlib.ExitStack() as opened:  # closes what is open if a later connection fails
         connection = ControllerConnection(

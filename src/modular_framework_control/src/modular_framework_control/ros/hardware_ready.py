@@ -18,7 +18,7 @@ from modular_framework_ros.parameter_declarations import parameters_below
 
 WAIT_PERIOD_S = 0.05
 USUAL_START_S = 10.0
-"""Start time after which a fault that still persists is logged [s]."""
+"""Time after the start at which a persistent fault is logged [s]."""
 
 
 class HardwareNotReadyError(Exception):

@@ -29,8 +29,8 @@ class LoopReport:
     The level is ERROR if the hardware has a fault. Otherwise, the level is WARN if cycles were late since the last
     message, a joint is outside its position limits or the hardware reports a warning.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
-    `work_max_us`, `no_processor_us` (total time for which the loop was due but had no processor),
-    `no_processor_max_us` (the longest such time), `fault`, `outside_limits`.
+    `work_max_us`, `no_processor_us` (total time of waits for a processor), `no_processor_max_us` (the longest wait for
+    a processor), `fault`, `outside_limits`.
 
     Args:
         statistics: Timing statistics written by the loop.

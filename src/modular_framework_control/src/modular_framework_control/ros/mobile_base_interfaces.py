@@ -84,7 +84,7 @@ class MobileBaseRosInterface:
 
 
 class DiffDriveRosInterface(MobileBaseRosInterface):
-    """Opens the common topics and those of a differential drive, and its dynamic_reconfigure server in `<name>`.
+    """Opens the common topics, the topics of a differential drive and its dynamic_reconfigure server in `<name>`.
 
     Publishes, if enabled, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and `<name>/wheel_joint_controller_state`
     (control_msgs/JointTrajectoryControllerState).
@@ -111,7 +111,7 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
 
 
 class FourWheelSteeringRosInterface(MobileBaseRosInterface):
-    """Opens the common topics and those of a base with four steered wheels.
+    """Opens the common topics and the topics of a base with four steered wheels.
 
     Subscribes to `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
     `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped).

@@ -17,7 +17,7 @@ class Outbox:
     """Queues jobs that one thread runs in sequence.
 
     Args:
-        backlog: Number of queued jobs from which on droppable jobs are dropped.
+        backlog: Minimum number of queued jobs at which droppable jobs are dropped.
     """
 
     def __init__(self, backlog: int = 200) -> None:

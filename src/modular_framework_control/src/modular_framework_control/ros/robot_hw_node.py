@@ -51,9 +51,9 @@ class RobotHwNode:
     Parameters: see `parameters/robot_hw.yaml` and the declaration named after the class of the hardware. The parameters
     of the hardware are private, or in the namespace of each name in `robot_hardware`.
 
-    Subscribes to the topics of hardware that announces itself and publishes those of the other hardware. The services
-    of `RosControllerManager` appear once all hardware is ready; the hardware is read and written from the start. The
-    topic and the service of `LoopReport` exist as long as the loop runs.
+    Subscribes to the ready topics of hardware that announces itself, and publishes the ready topics of the other
+    hardware. The services of `RosControllerManager` appear once all hardware is ready; the hardware is read and written
+    from the start. The topic and the service of `LoopReport` exist as long as the loop runs.
 
     Args:
         ended: Event that ends the loop: controllers stop, goals end, and the hardware is closed while the node can

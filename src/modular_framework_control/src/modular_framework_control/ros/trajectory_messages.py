@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Deserialises trajectories into arrays (`TrajectoryPoints`) instead of one object per point.
 
-The bytes on the wire are those of the public messages; only subscribers use these classes.
+The wire format equals the format of the public messages; only subscribers use these classes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from modular_framework_control.trajectory.serialized_points import Buffer, read_
 
 _U32 = struct.Struct("<I")
 _HEADER_BYTES = 12  # seq and stamp, before frame_id
-_STAMP_BYTES = 8  # of a goal_id, before its id
+_STAMP_BYTES = 8  # stamp of a goal_id, before its id
 
 
 class CompactJointTrajectory(JointTrajectory):  # type: ignore[misc]

@@ -53,7 +53,8 @@ class TrajectoryPoints:
     Attributes:
         times_s: Time of each point from the start of the trajectory, shape (points,).
         values: Positions, velocities and accelerations of each point, 0 if missing, shape (points, 3, joints). Values
-            beyond the number of joint names are left out; all values are left out if positions are missing for certain.
+            beyond the number of joint names are left out; all values are left out if the message is too small for all
+            positions.
         counts: Received numbers of positions, velocities and accelerations, shape (points, 3).
     """
 
@@ -203,7 +204,7 @@ class Track:
         first: Coefficients of the first segment, shape (6, columns).
         others: Coefficients of the other segments, shape (segments - 1, 6, columns).
         end_position: Final position, shape (columns,).
-        origin_s: Time of time_from_start 0.
+        origin_s: Time at which time_from_start is 0.
         offset: Offset of the positions of `others`, shape (columns,).
         columns: Columns of `joints` in the arrays; None for all columns.
         end_s: End of the last segment.
@@ -297,10 +298,10 @@ def splice(
     Args:
         spline: New trajectory, which ends at least MIN_SEGMENT_S after `splice_s`.
         joints: Indices of the trajectory's joints in the controller.
-        origin_s: Time of time_from_start 0.
-        splice_s: Time of the transition.
+        origin_s: Time at which time_from_start is 0.
+        splice_s: Time of the transition to the new trajectory.
         state: Desired state of the joints at `splice_s`, shape (3, joints).
-        continuous: Whether each joint is continuous and takes the shorter direction.
+        continuous: Whether each joint is continuous; continuous joints take the shorter direction.
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Check of a trajectory against the position and velocity limits of its joints, at its points and between them.
+"""Check of a trajectory against the position and velocity limits of its joints, at and between its points.
 
 Segments are sampled between points. Slightly excessive velocities are accepted, because the hardware enforces its
 limits and the joint only arrives a little late.
@@ -179,7 +179,7 @@ class LimitViolations:
 
 
 def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits, measured: Array) -> LimitViolations:
-    """Finds the limit violations of a trajectory, at its points and between them.
+    """Finds the limit violations of a trajectory, at and between its points.
 
     Args:
         spline: Trajectory.
@@ -187,15 +187,15 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
         limits: Limits of these joints.
         measured: Measured positions, shape (joints,) [rad|m]; a joint outside its range may move back.
     """
-    found = LimitViolations(names, limits, measured)
+    violations = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
     for chunk in chunks(len(spline.times_s)):
         positions, velocities = spline.states[chunk, POSITION], spline.states[chunk, VELOCITY]
         beyond = (positions < limits.min_positions - GOAL_TOLERANCE) | (
             positions > limits.max_positions + GOAL_TOLERANCE
         )
-        found.add(_Kind.POINT_POSITION, positions, beyond, chunk.start)
-        found.add(
+        violations.add(_Kind.POINT_POSITION, positions, beyond, chunk.start)
+        violations.add(
             _Kind.POINT_VELOCITY,
             velocities,
             np.abs(velocities) > MAX_VELOCITY_FACTOR * limits.max_velocities,
@@ -210,10 +210,10 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
         for chunk in chunks(len(durations_s)):
             extremes = _SegmentExtremes(spline.coefficients[chunk], durations_s[chunk])
             too_fast = np.abs(extremes.velocities) > MAX_VELOCITY_FACTOR * limits.max_velocities
-            found.add(_Kind.CURVE_VELOCITY, extremes.velocities, too_fast, chunk.start + 1)
-            _add_positions(found, extremes, limits, chunk.start + 1)
-    found.merge()
-    return found
+            violations.add(_Kind.CURVE_VELOCITY, extremes.velocities, too_fast, chunk.start + 1)
+            _add_positions(violations, extremes, limits, chunk.start + 1)
+    violations.merge()
+    return violations
 
 
 def first_segment_violations(
@@ -228,27 +228,29 @@ def first_segment_violations(
         measured: Measured positions, shape (joints,) [rad|m].
         point: Index of the first point.
     """
-    found = LimitViolations(names, limits, measured)
+    violations = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
     duration_s = track.origin_s + float(track.ends_s[0]) - track.start_s
     extremes = _SegmentExtremes(track.first[np.newaxis], np.array([duration_s]))
     speeds = np.abs(extremes.velocities)
     late = (speeds - limits.max_velocities) * duration_s > CURVE_MARGIN
-    found.add(
+    violations.add(
         _Kind.CURVE_VELOCITY, extremes.velocities, late & (speeds > MAX_VELOCITY_FACTOR * limits.max_velocities), point
     )
-    _add_positions(found, extremes, limits, point)
-    return found.text(point, point)
+    _add_positions(violations, extremes, limits, point)
+    return violations.text(point, point)
 
 
-def _add_positions(found: LimitViolations, extremes: _SegmentExtremes, limits: MotionLimits, first_point: int) -> None:
-    found.add(
+def _add_positions(
+    violations: LimitViolations, extremes: _SegmentExtremes, limits: MotionLimits, first_point: int
+) -> None:
+    violations.add(
         _Kind.CURVE_POSITION,
         extremes.min_positions,
         extremes.overshoots & (extremes.min_positions < limits.min_positions - CURVE_MARGIN),
         first_point,
     )
-    found.add(
+    violations.add(
         _Kind.CURVE_POSITION,
         extremes.max_positions,
         extremes.overshoots & (extremes.max_positions > limits.max_positions + CURVE_MARGIN),

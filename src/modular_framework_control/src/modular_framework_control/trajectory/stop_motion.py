@@ -23,7 +23,7 @@ FOLLOWING_LAG_S = 0.05
 at its measured velocity. Tuned on an arm that follows 0.03 s late over a network; a joint with a larger lag moves back
 a little while braking."""
 MAX_COMMAND_AGE_S = 0.01
-"""Maximum age of the last command [s]; the desired motion since then has not been sent to the joint."""
+"""Maximum age of the last command [s]; the joint has not received the desired motion after this command."""
 FOLLOWING_FRACTION = 0.1
 """Maximum relative velocity error of a joint that counts as following. Its ramp begins at the desired velocity, because
 measured velocities are delayed and noisy."""

@@ -95,11 +95,13 @@ def tolerances_of_goal(
     Raises:
         InvalidTrajectoryError: A tolerance is not a number.
     """
-    given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
+    named_tolerances = [
+        (kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()
+    ]
     faults = [
         f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
         f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the default) or less (not checked)"
-        for kind, name, tolerance in given
+        for kind, name, tolerance in named_tolerances
         if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)
     ]
     if faults:
@@ -130,11 +132,11 @@ def foreign_tolerances(
 
 
 def _merge(
-    defaults: Array, joint_names: Sequence[str], joints: Sequence[int], given: Mapping[str, JointTolerance]
+    defaults: Array, joint_names: Sequence[str], joints: Sequence[int], tolerances: Mapping[str, JointTolerance]
 ) -> Array:
     result = np.full_like(defaults, math.inf)
     for i in joints:
-        tolerance = given.get(joint_names[i], JointTolerance())
+        tolerance = tolerances.get(joint_names[i], JointTolerance())
         for row, value in enumerate((tolerance.position, tolerance.velocity)):
             result[row, i] = defaults[row, i] if value == 0.0 else value if value > 0.0 else math.inf
     return result

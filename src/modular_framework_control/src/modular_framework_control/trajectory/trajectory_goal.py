@@ -60,7 +60,7 @@ class TrajectorySnapshot:
         desired: Desired positions, velocities and accelerations, shape (3, joints).
         actual: Measured positions and velocities, shape (2, joints).
         error: Desired minus actual, shape (2, joints).
-        elapsed_s: Elapsed time of the trajectory since time_from_start 0.
+        elapsed_s: Current time_from_start of the trajectory.
     """
 
     time_s: float

@@ -84,7 +84,7 @@ class TrajectoryPlan:
         return state
 
     def elapsed_s(self, time_s: float) -> float:
-        """Returns the time since time_from_start 0 of the trajectory active at `time_s`."""
+        """Returns the time_from_start at `time_s` of the trajectory that is active at this time."""
         track = self._stage_at(time_s).tracks[-1]
         return max(0.0, min(time_s, track.end_s) - track.origin_s)
 

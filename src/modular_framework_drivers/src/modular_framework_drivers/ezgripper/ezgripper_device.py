@@ -40,7 +40,7 @@ MAX_STATE_AGE_S = 1.0
 
 
 SET_POINT_PERIODS = 2.0
-"""Periods for which a set point must last: one until the next set point, and one for its delay."""
+"""Number of periods that a set point must last: until the next set point, and one period for its delay."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +142,7 @@ class EzGripper:
             torque: Maximum torque [servo units].
 
         Returns:
-            The number of the goal, which is that of `state().goal` once the motion has started.
+            The number of the goal, which `state().goal` has once the motion has started.
 
         Raises:
             ValueError: If the position or the torque is outside its limits.

@@ -24,7 +24,7 @@ TORQUE_MAX = 1023
 SUSTAINED_TORQUE = 100
 """Torque that the motor can sustain indefinitely, according to the manufacturer."""
 WARNING_TEMPERATURE = 70.0
-"""Temperature from which on a warning is logged [deg C]; the motor switches itself off at 80 deg C."""
+"""Minimum temperature that causes a logged warning [deg C]; the motor switches itself off at 80 deg C."""
 CLOCKWISE_BIT = 1 << 10
 """Direction bit of the speed, load and torque registers."""
 MULTI_TURN_LIMIT = 4095

@@ -148,8 +148,8 @@ class CommandCheck:
     def _approach(self, index: int, command: float, joint: CheckedJoint, period_s: float) -> None:
         """Moves to the command within one cycle, or as fast as the velocity and acceleration limits allow.
 
-        A motion within one cycle must also let the joint have the velocity of the commands in the next cycle, so that
-        the joint does not overshoot.
+        After a motion within one cycle, the joint must be able to follow the velocity of the commands in the next cycle
+        without overshooting.
         """
         position, velocity = self.sent[index], self._velocities[index]
         min_velocity, max_velocity = joint.velocity_range(position, period_s)

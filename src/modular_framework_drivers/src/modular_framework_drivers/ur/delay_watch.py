@@ -13,9 +13,9 @@ PORT = 30004
 _HEADER = struct.Struct(">HB")
 _PROTOCOL, _VERSION = ord("V"), ord("v")
 _MIN_VERSION = (3, 4)
-_PATIENCE_S = 2.0  # for a response
-_PERIOD_S = 1.0  # between two requests
-_WINDOW = 250  # number of states whose ages are compared
+_PATIENCE_S = 2.0  # response timeout
+_PERIOD_S = 1.0  # request period
+_WINDOW = 250  # number of compared state ages
 
 
 class ConnectionEndedError(Exception):

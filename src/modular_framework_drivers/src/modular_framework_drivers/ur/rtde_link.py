@@ -27,18 +27,16 @@ from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, robot_fault
 from modular_framework_drivers.ur.child_process import ChildProcess
 from modular_framework_drivers.ur.state_watch import SilenceWatch
 
-START_TIMEOUT_S = 30.0  # for a process to start, even on a busy computer
+START_TIMEOUT_S = 30.0  # start timeout of a process, even on a busy computer
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
-_CONNECT_TIMEOUT_S = 5.0  # from the start of a process to the first state
-_PROGRAM_TIMEOUT_S = 15.0  # from the start of a process until the uploaded program runs
-_SILENCE_MARGIN_S = (
-    0.38  # by which the silence of a process may exceed that of the arm before the process has failed [s]
-)
-_MAX_RETRY_S = 2.0  # each attempt starts an interpreter, which takes 0.3 s of a processor
-_STOP_PATIENCE_S = 3.0  # for the arm to come to rest when the link is closed
-_STOP_TIMEOUT_S = 0.1  # for an ended process to send its stop after all queued commands
+_CONNECT_TIMEOUT_S = 5.0  # maximum time from the start of a process to the first state
+_PROGRAM_TIMEOUT_S = 15.0  # maximum time from the start of a process until the program runs
+_SILENCE_MARGIN_S = 0.38  # allowed silence of a process beyond `timeout_s`
+_MAX_RETRY_S = 2.0  # maximum time between attempts; each attempt takes 0.3 s of a processor to start an interpreter
+_STOP_PATIENCE_S = 3.0  # maximum time of the arm to come to rest when the link is closed
+_STOP_TIMEOUT_S = 0.1  # time of an ended process to send its stop after all queued commands
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,11 +37,11 @@ from modular_framework_drivers.ur.arm_messages import (
 from modular_framework_drivers.ur.delay_watch import ConnectionEndedError, DelayWatch
 from modular_framework_drivers.ur.state_watch import ModeConfirmation, SilenceWatch, is_plausible
 
-_PRIORITY, _RECEIVING_PRIORITY = 50, 60  # the threads of the control loop have 70 and 80
+_PRIORITY, _RECEIVING_PRIORITY = 50, 60  # below the priorities 70 and 80 of the control loop's threads
 _POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
-_FAILURE_TIMEOUT_S = 1.0  # for the cause of the failure to enter the queue
-_STOP_DECELERATION = 10.0  # at the end of a connection [rad/s^2]
+_FAILURE_TIMEOUT_S = 1.0  # maximum wait for queue space for the cause of the failure
+_STOP_DECELERATION = 10.0  # deceleration at the end of a connection [rad/s^2]
 _VARIABLES = [
     "timestamp",
     "actual_q",

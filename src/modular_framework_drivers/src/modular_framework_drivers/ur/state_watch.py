@@ -8,12 +8,12 @@ import math
 from modular_framework_drivers.ur.arm_messages import ArmState
 
 _MAX_STEP_S = 0.02
-_MAX_POSITION = 100.0  # some joints, such as wrist 3 of a UR3, rotate without limits [rad]
-_MAX_SPEED = 2.0 * math.pi  # of a measured joint; twice the maximum of a UR5 [rad/s]
+_MAX_POSITION = 100.0  # [rad]; some joints, such as wrist 3 of a UR3, rotate without limits
+_MAX_SPEED = 2.0 * math.pi  # measured joint speed [rad/s], twice the maximum of a UR5
 _POSITION_MARGIN = 0.05  # margin for rounding and clock jitter [rad]
-_MAX_MEASUREMENT = 1e4  # of currents [A], forces [N] and torques [Nm]
+_MAX_MEASUREMENT = 1e4  # magnitude of currents [A], forces [N] and torques [Nm]
 _MAX_MODE = 31
-_MAX_ADVANCE_S = 2.0  # of the controller's clock over the local clock at the end of a delay
+_MAX_ADVANCE_S = 2.0  # advance of the controller's clock relative to the local clock at the end of a delay
 
 
 class ModeConfirmation:
@@ -24,7 +24,7 @@ class ModeConfirmation:
         self._previous: tuple[int, ...] | None = None
 
     def confirm(self, modes: tuple[int, ...] | None) -> bool:
-        """Returns whether the modes of the newest state are those accepted, or those of the state before.
+        """Returns whether the modes of the newest state equal the accepted modes or the modes of the previous state.
 
         Args:
             modes: Modes of the newest state; None for a state read from damaged data. After damaged data, two further

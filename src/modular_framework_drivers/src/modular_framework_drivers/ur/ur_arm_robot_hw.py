@@ -38,11 +38,11 @@ JOINT_NAMES = (
 )
 _PERIOD_SMOOTHING = 0.02
 _MIN_PERIOD_S = 0.002
-_MAX_PERIOD_S = 0.05  # the motion of a longer cycle is made up gradually
-_STALE_S = 0.025  # three cycles of a CB3 controller
-_LATE_S = 0.04  # transmission delay of a state from which on a warning is reported [s]
-_PROGRAM_START_S = 1.0  # from the upload of a program to a state with a running program [s]
-_MAX_CAUSE_DELAY_S = 0.03  # delay from the end of a program to the state that explains this end [s]
+_MAX_PERIOD_S = 0.05  # the motion missed in a longer cycle is made up gradually
+_STALE_S = 0.025  # age of a stale state: three cycles of a CB3 controller
+_LATE_S = 0.04  # minimum transmission delay of a state that causes a warning [s]
+_PROGRAM_START_S = 1.0  # maximum time from the upload of a program to a state with a running program [s]
+_MAX_CAUSE_DELAY_S = 0.03  # maximum delay from the end of a program to the state with the cause [s]
 
 
 class UrArmHardware(RobotHW):
