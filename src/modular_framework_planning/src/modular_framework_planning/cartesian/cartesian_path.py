@@ -21,8 +21,8 @@ from modular_framework_planning.planning_interface.motion_check import MotionChe
 
 MAX_STEP_M = 0.01  # upper bound for max_step of a request
 RADIANS_PER_METRE = 3.5  # a step of 0.01 m may rotate by 0.035 rad, as in MoveIt
-MAX_STEPS = 50_000  # per request
-MIN_STEPS_FOR_MEAN = 10  # steps per line if jumps are detected by the mean step
+MAX_STEPS = 50_000  # maximum number of steps per request
+MIN_STEPS_FOR_MEAN = 10  # minimum number of steps per line for the mean step of jump detection
 
 Objection = Callable[[Array, Array], str]
 

@@ -60,7 +60,8 @@ class ExactCollision:
     def _sphere_distance(self, pair_index: int) -> float:
         """Returns the signed distance of a pair's bounding spheres [m], a lower bound of the pair's distance.
 
-        A plane has no bounding sphere; the distance is then that of the other part's sphere from the plane.
+        For a plane, which has no bounding sphere, the result is the distance between the plane and the other part's
+        sphere.
         """
         pair = self._pairs[pair_index]
         (centre, radius), (other_centre, other_radius) = (
@@ -104,7 +105,7 @@ class ExactCollision:
         return not self._is_far(pair_index) and self._collide(pair_index, coal.CollisionRequest()).isCollision()
 
     def contacts(self, positions: Array, pair_indices: Iterable[int]) -> list[tuple[int, Contact]]:
-        """Returns the touching pairs among those given, each with its deepest contact."""
+        """Returns the touching pairs among the given pairs, each with its deepest contact."""
         self._update_poses(positions)
         found = []
         for pair_index in pair_indices:

@@ -61,7 +61,7 @@ class PairMembers:
 
         Args:
             rows: Pair of the arrays for each watched pair, -1 for none.
-            indices: Watched pairs sorted by row, without those that have no row.
+            indices: Watched pairs sorted by row, without pairs that have no row.
             joined: Rows that each row at the end represents, shape (f, n).
         """
         self._rows, self._indices, self._joined = rows, indices, joined

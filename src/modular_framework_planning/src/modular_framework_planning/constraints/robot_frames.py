@@ -41,13 +41,13 @@ def holding_link(scene: PlanningScene, name: str) -> str:
     )
 
 
-def require_holding_link(scene: PlanningScene, name: str, what: str) -> str:
+def require_holding_link(scene: PlanningScene, name: str, noun: str) -> str:
     """Returns the link that a frame is fixed to, as `holding_link`.
 
     Args:
         scene: Planning scene.
         name: Name of a link, a held object or one of its subframes.
-        what: Description of the name, for the error message.
+        noun: Description of the name, for the error message.
 
     Raises:
         UnknownNameError: No such frame moves with the robot.
@@ -56,5 +56,5 @@ def require_holding_link(scene: PlanningScene, name: str, what: str) -> str:
     if not link:
         held = [f"{item.name}/{inner}" for item in scene.attached.values() for inner in item.body.subframes]
         known = [*scene.model.frame_ids, *scene.attached, *held]
-        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, what, name, known)
+        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, noun, name, known)
     return link

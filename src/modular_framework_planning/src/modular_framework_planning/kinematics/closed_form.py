@@ -80,7 +80,7 @@ def _axes_and_offsets(
 ) -> tuple[Array, Array, Array]:
     """Returns the axes (n, 3), the offsets between their points (n + 1, 3) and a rotation (3, 3), in the base frame.
 
-    The rotation converts a rotation of the last link to one of a tip that is aligned with the base at zero.
+    The rotation converts a rotation of the last link to the rotation of a tip that is aligned with the base at zero.
     """
     data = model.pin_model.createData()
     pin.computeJointJacobians(model.pin_model, data, model.with_mimics(np.zeros(len(model.joint_names))))

@@ -97,28 +97,30 @@ def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, co
         PlanningError: A component of the quaternion is missing, or the quaternion is invalid.
     """
     base, model = scene.model.base, scene.model
-    given = {item.joint_name: item for item in constraints if base is not None and item.joint_name in base.quaternion}
-    if base is None or not given:
+    components = {
+        item.joint_name: item for item in constraints if base is not None and item.joint_name in base.quaternion
+    }
+    if base is None or not components:
         return list(constraints)
-    if len(given) != len(base.quaternion):
+    if len(components) != len(base.quaternion):
         raise PlanningError(
             code,
-            f"{where}: joint constraints on {', '.join(given)} only; give all of {', '.join(base.quaternion)}, or "
+            f"{where}: joint constraints on {', '.join(components)} only; give all of {', '.join(base.quaternion)}, or "
             f"{', '.join(base.angles)} [rad]",
         )
     try:
-        rotation = make_transform((0.0, 0.0, 0.0), [given[name].position for name in base.quaternion], where)
+        rotation = make_transform((0.0, 0.0, 0.0), [components[name].position for name in base.quaternion], where)
     except GeometryError as error:
         raise PlanningError(code, error.reason) from error
     values = base.values(rotation, scene.positions[model.base_indices])
     # a quaternion contains half angles
-    tolerance = 2.0 * min(min(item.tolerance_above, item.tolerance_below) for item in given.values())
+    tolerance = 2.0 * min(min(item.tolerance_above, item.tolerance_below) for item in components.values())
     angles = [
         JointConstraint(name, float(value), tolerance, tolerance, 1.0)
         for name, value in zip(base.variables, values, strict=True)
         if name in base.angles
     ]
-    return [item for item in constraints if item.joint_name not in given] + angles
+    return [item for item in constraints if item.joint_name not in components] + angles
 
 
 def goal_values(model: RobotModel, joints: Sequence[str], positions: Array) -> dict[str, float]:

@@ -31,8 +31,8 @@ def joints_moved(before: PlanningScene, after: PlanningScene) -> bool:
 def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMessage | None:
     """Returns the diff that turns one scene into the other, or None for equal scenes.
 
-    A diff cannot remove fixed frames, nor colours except with their objects. If one of these disappears, the result is
-    the whole scene.
+    A diff cannot remove fixed frames or the colours of remaining objects. If a fixed frame or such a colour disappears,
+    the result is the whole scene.
     """
     remaining = after.objects.keys() | after.attached.keys()
     removed = (before.objects.keys() | before.attached.keys()) - remaining  # with their colours

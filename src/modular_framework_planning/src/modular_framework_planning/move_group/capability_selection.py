@@ -35,10 +35,10 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
 
     As in MoveIt, the parameters are lists separated by spaces, and an unknown name is only logged as a warning.
     """
-    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(parameter("~capabilities"))]
+    requested = [(rospy.resolve_name("~capabilities"), name) for name in _split(parameter("~capabilities"))]
     for pipeline, settings in (parameter(PIPELINES) or {}).items():
         if isinstance(settings, dict):
-            wanted += [
+            requested += [
                 (rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
                 for name in _split(settings.get("capabilities", ""))
             ]
@@ -46,12 +46,12 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
         (rospy.resolve_name("~disable_capabilities"), name) for name in _split(parameter("~disable_capabilities"))
     ]
     known = list(dict.fromkeys(item.name for item in table))
-    for where, name in (*wanted, *disabled):
+    for where, name in (*requested, *disabled):
         if name not in known:
             rospy.logwarn(
                 "%s: unknown capability '%s'; known: %s%s", where, name, ", ".join(known), nearest(name, known)
             )
-    enabled, removed = ({name for _, name in items} for items in (wanted, disabled))
+    enabled, removed = ({name for _, name in items} for items in (requested, disabled))
     return [item.build for item in table if (item.default or item.name in enabled) and item.name not in removed]
 
 

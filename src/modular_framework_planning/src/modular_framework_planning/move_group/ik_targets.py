@@ -54,7 +54,7 @@ class IkTarget:
         Args:
             solver: Solver of the group.
             seed: Joint positions of the whole robot [rad or m].
-            timeout_s: Time limit [s]; None for the group's own.
+            timeout_s: Time limit [s]; None for the group's time limit.
         """
         if solver.settings.position_only:
             return solver.position_solutions(
@@ -160,7 +160,7 @@ def solvers_of(kinematics: KinematicsPool, model: RobotModel, group: JointGroup,
             "kinematics needs one chain per link",
         )
     candidates = [[item for item in subgroups if _moves(model, item, link)] for link in links]
-    unmatched = [link for link, found in zip(links, candidates, strict=True) if not found]
+    unmatched = [link for link, solvers in zip(links, candidates, strict=True) if not solvers]
     if unmatched:
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
@@ -207,21 +207,21 @@ def combined_solutions(
         targets: Targets.
         solvers: Solver of each target; the solvers share no joints.
         seed: Joint positions of the whole robot [rad or m].
-        timeout_s: Time limit for all solvers together [s]; None for the groups' own.
+        timeout_s: Time limit for all solvers together [s]; None for the time limits of the groups.
 
     Raises:
         PlanningError: A target is unreachable.
     """
     solver_timeout_s = None if timeout_s is None else timeout_s / len(targets)
     max_solutions = max(1, int(MAX_COMBINATIONS ** (1.0 / len(targets))))
-    found = []
+    solutions = []
     for target, solver in zip(targets, solvers, strict=True):
-        found.append(target.solutions(solver, seed, solver_timeout_s)[:max_solutions])
-        if not found[-1]:
+        solutions.append(target.solutions(solver, seed, solver_timeout_s)[:max_solutions])
+        if not solutions[-1]:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, target.failure_reason(solver, seed))
     if len(targets) == 1:
-        return found[0]
-    combined = np.array([_combined(seed, solvers, choice) for choice in product(*found)])
+        return solutions[0]
+    combined = np.array([_combined(seed, solvers, choice) for choice in product(*solutions)])
     combined = combined[np.argsort(np.linalg.norm(combined - seed, axis=1), kind="stable")]
     pairs = list(zip(targets, solvers, strict=True))
     missed = [
@@ -269,13 +269,13 @@ def sampled_solutions(
         [*constraints.orientations, *(orientation for _, orientations in poses for orientation in orientations)],
     )
     rng = np.random.default_rng(0)
-    found = all_constraints.project(scene.positions, group.indices)
+    positions = all_constraints.project(scene.positions, group.indices)
     for attempt in count():
-        if found is not None:
-            yield found
+        if positions is not None:
+            yield positions
         if attempt >= MAX_ATTEMPTS if math.isinf(end_s) else attempt >= MIN_ATTEMPTS and time.monotonic() > end_s:
             return
-        found = all_constraints.sample(rng, scene.positions, group.indices, attempts=1)
+        positions = all_constraints.sample(rng, scene.positions, group.indices, attempts=1)
 
 
 def _combined(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Execution of pickup and place goals: plans each grasp or location in turn and executes the first feasible one."""
+"""Execution of pickup and place goals: plans each grasp or location and executes the first feasible candidate."""
 
 from __future__ import annotations
 

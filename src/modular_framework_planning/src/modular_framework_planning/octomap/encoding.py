@@ -141,9 +141,9 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
     return _expanded(resolution, starts, depths, np.clip(values, LOWEST, HIGHEST))
 
 
-def _broken(got: str) -> GeometryError:
+def _broken(content: str) -> GeometryError:
     return GeometryError(
-        f"octomap data: got {got}; expected the pre-order stream of one OcTree; send data written by octomap"
+        f"octomap data: got {content}; expected the pre-order stream of one OcTree; send data written by octomap"
     )
 
 

@@ -2,8 +2,8 @@
 """An occupancy map of voxels, updated from depth sensors.
 
 Occupancy is a log-odds value per voxel, updated and clamped as in Hornung et al., "OctoMap: an efficient probabilistic
-3D mapping framework based on octrees", Autonomous Robots 34 (2013). The constants are those of the OctoMap library, so
-that maps are compatible. A map has two flat arrays, sorted by Morton code like the leaves of an octree.
+3D mapping framework based on octrees", Autonomous Robots 34 (2013). The constants equal the constants of the OctoMap
+library, so that maps are compatible. A map has two flat arrays, sorted by Morton code like the leaves of an octree.
 """
 
 from __future__ import annotations

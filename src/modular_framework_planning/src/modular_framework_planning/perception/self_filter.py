@@ -27,7 +27,7 @@ MAX_PLANES = 64  # larger hulls are replaced by tangent planes in fixed directio
 
 
 def _even_directions(count: int) -> Array:
-    """Returns unit vectors in both directions of each axis, and `count` more on a spiral over the sphere."""
+    """Returns unit vectors in both directions of each axis, and `count` unit vectors on a spiral over the sphere."""
     heights = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
     angles = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     widths = np.sqrt(1.0 - heights**2)
@@ -104,8 +104,8 @@ class RegionCache:
 
     def keep_only(self, geometries: Iterable[Any]) -> None:
         """Drops the regions of all other geometries."""
-        wanted = {id(item) for item in geometries}
-        self._regions = {key: value for key, value in list(self._regions.items()) if key in wanted}
+        kept_ids = {id(item) for item in geometries}
+        self._regions = {key: value for key, value in list(self._regions.items()) if key in kept_ids}
 
 
 FilterMaker = Callable[[RegionCache, Sequence[tuple[Any, Transform]], Array], SelfFilter]

@@ -58,7 +58,8 @@ class DepthImageSettings(UpdaterSettings):
         queue_size: Maximum number of waiting images.
         near_clipping_plane_distance: Minimum valid depth [m].
         far_clipping_plane_distance: Maximum range [m]; farther measurements only clear voxels.
-        shadow_threshold: Maximum distance behind robot or object of a measurement that still belongs to it [m].
+        shadow_threshold: Maximum distance of a measurement behind a body at which the measurement belongs to the body
+            [m].
         padding_scale: Factor of the camera's depth noise in the padding.
         padding_offset: Padding of robot and known objects [m].
         skip_vertical_pixels: Number of rows left out at the top and at the bottom.
@@ -108,8 +109,8 @@ def read_sensors(entries: Any, max_range: float | None) -> tuple[list[SensorSett
 
 def _read_sensor(entry: Any, max_range: float | None) -> SensorSettings:
     if not isinstance(entry, dict) or entry.get("sensor_plugin") not in PLUGINS:
-        got = entry.get("sensor_plugin") if isinstance(entry, dict) else type(entry).__name__
-        raise ModelError(f"sensor_plugin is '{got}'; supported plugins: {', '.join(PLUGINS)}")
+        plugin = entry.get("sensor_plugin") if isinstance(entry, dict) else type(entry).__name__
+        raise ModelError(f"sensor_plugin is '{plugin}'; supported plugins: {', '.join(PLUGINS)}")
     kind = PLUGINS[entry["sensor_plugin"]]
     known = {item.name: item.type for item in fields(kind)}
     values: dict[str, Any] = {} if max_range is None or kind is DepthImageSettings else {"max_range": max_range}

@@ -240,26 +240,26 @@ class ManoeuvrePlanner:
     def _reachable(self, manoeuvre: Manoeuvre, scene: PlanningScene) -> list[Array]:
         """Returns collision-free arm configurations at the grasp, nearest first; raises PlanningError."""
         arm = self._arm
-        found = arm.solver.solutions(arm.link, manoeuvre.tip_pose, scene.positions)
-        if not found:
+        solutions = arm.solver.solutions(arm.link, manoeuvre.tip_pose, scene.positions)
+        if not solutions:
             raise PlanningError(
                 ErrorCode.NO_IK_SOLUTION,
                 f"{manoeuvre.name}: reach: "
                 + arm.solver.explain_unreachable(arm.link, manoeuvre.tip_pose, scene.positions),
             )
-        at_nearest = scene.with_positions(found[0])
+        at_nearest = scene.with_positions(solutions[0])
         checker, motion = self._checkers(at_nearest)
         collision_free = first_free(
-            [item[arm.group.indices] for item in found],
+            [item[arm.group.indices] for item in solutions],
             motion.state_is_free,
             self._settings.max_attempted_states_per_pose,
         )
         if not collision_free:
             raise PlanningError(
                 ErrorCode.GOAL_IN_COLLISION,
-                f"{manoeuvre.name}: reach: all {len(found)} inverse "
+                f"{manoeuvre.name}: reach: all {len(solutions)} inverse "
                 "kinematics solutions collide; nearest solution: "
-                f"{describe_contacts(checker.contacts(found[0], include_fixed=False))}",
+                f"{describe_contacts(checker.contacts(solutions[0], include_fixed=False))}",
             )
         return collision_free
 

@@ -61,7 +61,7 @@ class CollisionChecker(Protocol):
         ...
 
     def colliding_state(self, vertices: Array, step: float) -> Array | None:
-        """Returns a colliding state among those checked by path_is_free, shape (joints,), or None."""
+        """Returns a colliding state among the states that path_is_free checks, shape (joints,), or None."""
         ...
 
     def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:

@@ -210,7 +210,8 @@ class PlanningProblem:
 
         Args:
             polyline: Joint vectors, shape (n, joints).
-            step: Joint displacement between checked states [rad or m], at least that of the final validation.
+            step: Joint displacement between checked states [rad or m], at least the displacement of the final
+                validation.
         """
         return self.constraints is None or self.constraints.edges_satisfied(
             self.motion.full_path(polyline), max(step, self.settings.motion_step)

@@ -11,7 +11,7 @@ from modular_framework_planning.trajectory_processing.path_shortening import Com
 
 
 def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
-    """Returns a path with the same ends, not longer than the given one.
+    """Returns a path with the same ends that is not longer.
 
     Args:
         problem: Planning problem with collision checks and path constraints.

@@ -71,13 +71,13 @@ class PlannerRegistry:
 
     def by_pipeline(self) -> dict[str, tuple[str, ...]]:
         """Returns the planner names of each pipeline that loads; empty for a plugin that accepts any name."""
-        found: dict[str, tuple[str, ...]] = {}
+        planners: dict[str, tuple[str, ...]] = {}
         for name, spec in self.specs.items():
             try:
-                found[name] = self._planners(spec) if planner_ids(spec) else ()
+                planners[name] = self._planners(spec) if planner_ids(spec) else ()
             except ModelError:
                 continue  # move_group skips a pipeline without plugin
-        return found
+        return planners
 
     def resolve(self, name: str, group: str = "", pipeline: str = "") -> ResolvedPlanner:
         """Returns the planner that a name refers to.

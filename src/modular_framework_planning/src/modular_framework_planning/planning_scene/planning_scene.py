@@ -273,17 +273,17 @@ class PlanningScene:
             return SE3.Identity()
         if self.model.has_link(frame):
             return self.model.link_transforms(self.positions if positions is None else positions)[frame]
-        found = self._body_transform(frame, positions)
-        if found is None:
-            found = self._subframe_transform(frame, positions)
-        if found is None:
-            found = self.fixed_frames.get(
+        transform = self._body_transform(frame, positions)
+        if transform is None:
+            transform = self._subframe_transform(frame, positions)
+        if transform is None:
+            transform = self.fixed_frames.get(
                 frame
             )  # last, because object detectors may publish tf frames named like objects
-        if found is None:
+        if transform is None:
             known = [*self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
             raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
-        return found
+        return transform
 
     def _bodies(self) -> dict[str, CollisionObject]:
         return {**self.objects, **{name: item.body for name, item in self.attached.items()}}

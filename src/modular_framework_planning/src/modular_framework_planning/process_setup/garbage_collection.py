@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps Python's garbage collector away from what a process has loaded for good."""
+"""Exempts the objects that a process loads once from Python's garbage collection."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import gc
 
 
 def freeze_loaded_objects() -> None:
-    """Has the collector leave out all objects there are now; to be called when a process is ready to plan.
+    """Exempts all existing objects from garbage collection; call this function when a process is ready to plan.
 
-    Modules, compiled loops and the robot are several hundred thousand objects. Looking through them in the middle of
-    every few plans took a tenth of the time of planning. At exit they are collected as usual: bindings report objects
-    that are left then.
+    Modules, compiled loops and the robot are several hundred thousand objects. Visiting these objects during every few
+    plans took a tenth of the planning time. At exit, the objects are collected as usual, because bindings report
+    remaining objects as leaks.
     """
     gc.collect()
     gc.freeze()

@@ -43,8 +43,8 @@ class ControllerSpec:
         max_effort: Maximum effort of a gripper [N or Nm].
         command_joints: Joints whose summed positions are the goal of a gripper.
         allow_failure: Whether an aborted gripper goal counts as success, because the gripper holds an object.
-        duration_scaling, duration_margin: Factor of and addition to the allowed execution time [-, s]; None for the
-            general values.
+        duration_scaling, duration_margin: Factor and additional time of the allowed execution time [-, s]; None for the
+            values of ExecutionSettings.
         path_tolerances, goal_tolerances: Joint tolerances along the path and at the goal.
         goal_time_tolerance: Allowed delay at the goal [s].
         rate: Frequency of a fake controller [Hz].

@@ -13,8 +13,8 @@ class ExecutionSettings:
 
     Attributes:
         execution_duration_monitoring: Whether a motion that exceeds its allowed duration is stopped.
-        allowed_execution_duration_scaling, allowed_goal_duration_margin: Factor of and addition to the planned
-            duration, which give the allowed duration [-, s]; an entry of controller_list can override both.
+        allowed_execution_duration_scaling, allowed_goal_duration_margin: Factor on the planned duration and additional
+            time, which give the allowed duration [-, s]; an entry of controller_list can override both.
         execution_velocity_scaling: Speed of the execution relative to the plan.
         allowed_start_tolerance: Maximum distance of a joint from the first point [rad or m]; 0 for no check.
         joints_allowed_start_tolerance: Start tolerances, keyed by joint [rad or m].

@@ -106,7 +106,7 @@ class PathWatch:
         return None
 
     def other_joints_moved(self, positions: Array) -> bool:
-        """Checks whether a joint outside the motion has moved by more than CHECK_STEP since the last True.
+        """Checks whether a joint outside the motion has moved by more than CHECK_STEP since the last result True.
 
         Args:
             positions: Positions of the whole robot [rad or m].

@@ -68,7 +68,7 @@ def shorten(
     rng: np.random.Generator | None,
     compiled: CompiledEdgeTest | None = None,
 ) -> Array:
-    """Returns a path with the same ends, not longer than the given one.
+    """Returns a path with the same ends that is not longer.
 
     Args:
         path: Polyline, shape (n, joints).

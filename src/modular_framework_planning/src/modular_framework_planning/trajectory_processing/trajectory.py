@@ -73,8 +73,8 @@ class Trajectory:
         return np.asarray(self._values(times, 1)[0])
 
     def _values(self, times: Array, orders: int) -> Array:
-        wanted = np.ascontiguousarray(times, dtype=float)
-        return curve_values(np.ascontiguousarray(self.times, dtype=float), self.coefficients, wanted, orders)
+        sample_times = np.ascontiguousarray(times, dtype=float)
+        return curve_values(np.ascontiguousarray(self.times, dtype=float), self.coefficients, sample_times, orders)
 
     def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
         """Returns uniform times from start to end, inclusive, with a spacing of at most `period_s`."""

@@ -41,7 +41,7 @@ from modular_framework_ros.publishing import publish
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
 START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
-TEXT_ABOVE_TIP_M = 0.45  # keeps the text clear of the hand
+TEXT_ABOVE_TIP_M = 0.45  # distance of the text from the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # maximum wait of a plan for a dragged goal
 BASE_SCALE = 3.0  # size of the base's marker relative to the tip's marker
@@ -305,9 +305,9 @@ class InteractiveGoal:
         target.header.frame_id = self._model.planning_frame
         seed = self._state_of(self._goal)
         for avoid in (True, False):
-            found = self._client.solve_ik(self._group.name, self._group.tip_link, target, seed, avoid)
-            if found is not None:
-                positions = self._positions_of(found)
+            solution = self._client.solve_ik(self._group.name, self._group.tip_link, target, seed, avoid)
+            if solution is not None:
+                positions = self._positions_of(solution)
                 problem = "" if avoid else self._client.problem_of(self._group.name, self._state_of(positions))
                 self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
                 self._marker.move(BASE, self._base_pose())

@@ -49,7 +49,7 @@ class MotionOptions:
 def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
     """Returns a pipeline's planners for a group, as MoveIt's panel in RViz does.
 
-    The planners are those of entries `group[planner]` or, without any, the entries for all groups.
+    The planners are taken from the entries `group[planner]` or, if the group has none, from the entries for all groups.
     """
     group_planners = [
         name[len(group) + 1 : -1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")

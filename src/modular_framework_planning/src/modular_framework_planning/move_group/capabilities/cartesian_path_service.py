@@ -68,7 +68,7 @@ class CartesianPathService(ServiceCapability):
         details: dict[str, Any] = {"group": request.group_name, "fraction": 0.0}
         try:
             lines = self._read(request)
-            found = straight_line(
+            path = straight_line(
                 PoseFollower(lines.solver, lines.link, lines.scene.positions),
                 lines.waypoints,
                 request.max_step,
@@ -78,23 +78,21 @@ class CartesianPathService(ServiceCapability):
                 objection=self._objection(lines, request),
                 carried=lines.offset,
             )
-            trajectory = self._timed(lines, found, request)
+            trajectory = self._timed(lines, path, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
             return response
         response.start_state = state_message(lines.scene)
         response.solution = trajectory_message(trajectory, lines.scene.model)
-        response.fraction = found.fraction
+        response.fraction = path.fraction
         response.error_code.val = ErrorCode.SUCCESS
-        if found.stop:
-            rospy.logwarn(
-                "cartesian_path: %.1f %% of the path was planned, until %s", 100.0 * found.fraction, found.stop
-            )
+        if path.stop:
+            rospy.logwarn("cartesian_path: %.1f %% of the path was planned, until %s", 100.0 * path.fraction, path.stop)
         self._context.reporter.report(
             "cartesian_path",
             ErrorCode.SUCCESS,
-            found.stop,
-            **{**details, "fraction": found.fraction, "points": len(trajectory.times)},
+            path.stop,
+            **{**details, "fraction": path.fraction, "points": len(trajectory.times)},
         )
         return response
 
@@ -141,16 +139,16 @@ class CartesianPathService(ServiceCapability):
 
         return objection
 
-    def _timed(self, lines: _Lines, found: StraightLine, request: Any) -> Trajectory:
+    def _timed(self, lines: _Lines, path: StraightLine, request: Any) -> Trajectory:
         model, indices = lines.scene.model, lines.group.indices
         velocity, acceleration = model.max_velocity[indices], model.max_acceleration[indices]
         step = self._context.pipeline("").settings.motion_step
 
         def is_free(curve: Array) -> bool:
-            moves = lines.checker is not None and len(found.rows) > 1
+            moves = lines.checker is not None and len(path.rows) > 1
             return not moves or lines.motion.colliding_state(curve, step) is None
 
-        trajectory = time_line(lines.group.joints, found.rows, velocity, acceleration, is_free)
+        trajectory = time_line(lines.group.joints, path.rows, velocity, acceleration, is_free)
         if request.max_cartesian_speed <= 0.0:
             return trajectory
         name = request.cartesian_speed_limited_link or lines.follower

@@ -91,8 +91,8 @@ class KinematicsService(MoveGroupCapability):
             scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, links[0]
         )
         timeout_s = self._timeout(request)
-        found = combined_solutions(targets, solvers, scene.positions, timeout_s)
-        valid = [positions for positions in found if constraints.satisfied(positions)]
+        solutions = combined_solutions(targets, solvers, scene.positions, timeout_s)
+        valid = [positions for positions in solutions if constraints.satisfied(positions)]
         if valid and not request.avoid_collisions:
             return valid[0]
         checker = self._context.new_checker(scene, group.indices) if request.avoid_collisions else None
@@ -107,9 +107,9 @@ class KinematicsService(MoveGroupCapability):
             for positions in sampled_solutions(scene, group, targets, solvers, constraints=constraints, end_s=end_s):
                 if checker is None or checker.is_free(positions):
                     return positions
-        tips = f"{len(found)} inverse kinematics solutions for {', '.join(links)}"
+        tips = f"{len(solutions)} inverse kinematics solutions for {', '.join(links)}"
         if not valid:
-            reason = f"none of {tips} satisfies the constraints; nearest solution: {constraints.describe(found[0])}"
+            reason = f"none of {tips} satisfies the constraints; nearest solution: {constraints.describe(solutions[0])}"
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, reason)
         assert checker is not None
         contacts = describe_contacts(checker.contacts(valid[0], include_fixed=False))
@@ -119,7 +119,7 @@ class KinematicsService(MoveGroupCapability):
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
-        """Returns the requested timeout; None for the group's own, infinite if /seed is set."""
+        """Returns the requested timeout; None for the group's timeout, infinite if /seed is set."""
         if launch_seed() is not None:
             return math.inf  # attempt counts bound the search, so that results do not depend on the clock
         requested = request.timeout.to_sec()

@@ -21,7 +21,7 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.trajectory_execution.controllers import GRIPPER, TRAJECTORY, ControllerSpec
 
 LIST_SERVICE = "controller_manager/list_controllers"
-MAX_AGE_S = 1.0  # of the list of controllers
+MAX_AGE_S = 1.0  # maximum age of the list of controllers
 # suffix of a controller's type -> kind and name of its action
 CONTROLLER_TYPES = {
     "JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
@@ -96,12 +96,12 @@ class RosControlControllers(ActionControllers):
         """Returns the loaded controllers, at most MAX_AGE_S old."""
         if time.monotonic() - self._listed_s > MAX_AGE_S:
             self._update()
-        found = []
+        specs = []
         for namespace, states in self._states.items():
             for spec in (spec_of(state, namespace) for state in states):
                 if spec is not None:
                     settings = self._settings.get(spec.name)
-                    found.append(
+                    specs.append(
                         spec
                         if settings is None
                         else replace(
@@ -114,7 +114,7 @@ class RosControlControllers(ActionControllers):
                             command_joints=settings.command_joints or spec.command_joints,
                         )
                     )
-        return tuple(found)
+        return tuple(specs)
 
     def _update(self) -> None:
         namespaces = manager_namespaces() if self._namespace is None else [self._namespace]

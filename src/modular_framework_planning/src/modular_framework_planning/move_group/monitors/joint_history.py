@@ -30,7 +30,10 @@ class JointHistory:
         self._positions: deque[Array] = deque(maxlen=HISTORY_LENGTH)
 
     def add(self, stamp_s: float, positions: Array) -> None:
-        """Stores positions [rad or m]; a stamp more than 1 s before the newest one clears the history (clock reset)."""
+        """Stores positions [rad or m].
+
+        A stamp more than 1 s before the newest stamp clears the history, because the clock was reset.
+        """
         if self._times and stamp_s < self._times[-1] - 1.0:
             self._times.clear()
             self._positions.clear()

@@ -45,7 +45,7 @@ class SceneMonitor:
     Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object, tf.
     Publishes: ~monitored_planning_scene, the whole scene to each new subscriber, then the changes. Changes of joint
     positions and tf frames are published at most at the rate in `settings`.
-    Parameters: those of `settings`, below ~planning_scene_monitor.
+    Parameters: the fields of `settings`, below ~planning_scene_monitor.
     """
 
     def __init__(self, model: RobotModel, padding: Padding, settings: SceneMonitorSettings) -> None:

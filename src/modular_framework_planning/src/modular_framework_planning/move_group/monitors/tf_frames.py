@@ -55,8 +55,8 @@ class TfFrames:
     def _lookup(self, base: str, name: str) -> Transform | None:
         """Returns the last known transform of a frame, or None if the frames are not connected."""
         try:
-            found = self._buffer.lookup_transform_core(base, name, rospy.Time(0)).transform
-            t, q = found.translation, found.rotation
+            transform = self._buffer.lookup_transform_core(base, name, rospy.Time(0)).transform
+            t, q = transform.translation, transform.rotation
             return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{name}'")
         except (tf2_ros.TransformException, PlanningError):
             return None

@@ -69,7 +69,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     largest = max_blends(vertices, float(tolerance))
     tries_largest = (
         problem.constraints is None and path.path_prefix == 0
-    )  # otherwise the validation covers not all blends
+    )  # otherwise the validation would not cover all blends
     if tries_largest:  # most often, all blends are collision-free at their maximum size
         rounded = timed(largest)
         if not largest.any() or problem.solution_validator.is_valid(problem, rounded):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Replaces a start state that violates the path constraints with the nearest state that satisfies them."""
+"""Replaces a start state that violates the path constraints with the nearest state that satisfies the constraints."""
 
 from __future__ import annotations
 
