@@ -79,11 +79,11 @@ class CameraProcess:
         Args:
             cameras: All cameras except the fixed cameras.
         """
-        wanted = {camera.name: camera for camera in (*self._fixed, *cameras)}
-        if wanted == self._cameras:
+        new_cameras = {camera.name: camera for camera in (*self._fixed, *cameras)}
+        if new_cameras == self._cameras:
             return
-        self._cameras = wanted
-        self._due_ns = {name: due_ns for name, due_ns in self._due_ns.items() if name in wanted}
+        self._cameras = new_cameras
+        self._due_ns = {name: due_ns for name, due_ns in self._due_ns.items() if name in new_cameras}
         if not self._connected:
             return
         if self._process is None:
@@ -114,8 +114,8 @@ class CameraProcess:
         report = self._report
         if not report.wanted or report.images < self._sent or self._pipe is None or self._tracker is None:
             return
-        wanted = (name for name in report.wanted if name in self._cameras)
-        due = [self._cameras[name] for name in wanted if self._is_due(name, time_ns)]
+        names = (name for name in report.wanted if name in self._cameras)
+        due = [self._cameras[name] for name in names if self._is_due(name, time_ns)]
         if due:
             self._sent += 1
             try:

@@ -47,12 +47,12 @@ def pose_from_msg(message: PoseMsg) -> Pose:
     return Pose(position, normalised_quaternion((q.x, q.y, q.z, q.w)))
 
 
-def vector_from_msg(message: Vector3 | Point, what: str, bound: float, unit: str) -> tuple[float, float, float]:
+def vector_from_msg(message: Vector3 | Point, noun: str, bound: float, unit: str) -> tuple[float, float, float]:
     """Returns the numbers of a vector or point.
 
     Args:
         message: The vector or point.
-        what: Name of the value for the error message.
+        noun: Name of the value for the error message.
         bound: Maximum magnitude of each number.
         unit: Unit of the numbers for the error message.
 
@@ -60,16 +60,16 @@ def vector_from_msg(message: Vector3 | Point, what: str, bound: float, unit: str
         ValueError: A number is not finite or too large.
     """
     values = (message.x, message.y, message.z)
-    check_numbers(values, what, bound, unit)
+    check_numbers(values, noun, bound, unit)
     return values
 
 
-def check_numbers(values: Sequence[float], what: str, bound: float, unit: str) -> None:
+def check_numbers(values: Sequence[float], noun: str, bound: float, unit: str) -> None:
     """Checks that numbers are finite and within a bound.
 
     Args:
         values: The numbers.
-        what: Name of the value for the error message.
+        noun: Name of the value for the error message.
         bound: Maximum magnitude of each number.
         unit: Unit of the numbers for the error message.
 
@@ -77,7 +77,7 @@ def check_numbers(values: Sequence[float], what: str, bound: float, unit: str) -
         ValueError: A number is not finite or too large.
     """
     if not all(math.isfinite(value) and abs(value) <= bound for value in values):
-        raise ValueError(f"{what} {list(values)} is not allowed; give finite numbers of at most {bound:g} {unit}")
+        raise ValueError(f"{noun} {list(values)} is not allowed; give finite numbers of at most {bound:g} {unit}")
 
 
 def twist_to_msg(twist: Twist) -> TwistMsg:

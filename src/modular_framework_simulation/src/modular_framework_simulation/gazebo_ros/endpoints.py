@@ -34,9 +34,9 @@ class Endpoints:
         self._loop = loop
         self._opened: list[Any] = []
 
-    def in_loop(self, what: str, work: Callable[[], Any]) -> Any:
+    def in_loop(self, name: str, work: Callable[[], Any]) -> Any:
         """Runs work in the loop's thread and returns the result."""
-        return self._loop.requests.call(what, work, _RESPONSE_TIMEOUT_S)
+        return self._loop.requests.call(name, work, _RESPONSE_TIMEOUT_S)
 
     def serve(self, name: str, kind: Any, work: Work) -> None:
         """Advertises a service with `success` and `status_message`, handled by the loop's thread.

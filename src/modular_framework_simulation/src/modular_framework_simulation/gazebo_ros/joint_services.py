@@ -110,20 +110,20 @@ def _kind_of_robot_joint(measured: JointMeasurement) -> int:
     return int(kinds.CONTINUOUS if math.isinf(measured.upper) else kinds.REVOLUTE)
 
 
-def _single_value(values: Sequence[float], what: str, minimum: float) -> float | None:
+def _single_value(values: Sequence[float], noun: str, minimum: float) -> float | None:
     """Returns the value of the single axis; None if not given."""
     if len(values) > 1:
-        raise ValueError(f"{what} has {len(values)} values; expected one value, because every joint has one axis")
+        raise ValueError(f"{noun} has {len(values)} values; expected one value, because every joint has one axis")
     for value in values:
-        conversions.check_numbers((value,), what, conversions.MAX_FORCE, "in SI units")
+        conversions.check_numbers((value,), noun, conversions.MAX_FORCE, "in SI units")
         if value < minimum:
-            raise ValueError(f"{what} is {value:g}; allowed: {minimum:g} or greater")
+            raise ValueError(f"{noun} is {value:g}; allowed: {minimum:g} or greater")
         return float(value)
     return None
 
 
-def _limit(values: Sequence[float], what: str) -> float | None:
+def _limit(values: Sequence[float], noun: str) -> float | None:
     """Returns the limit of the single axis, which may be infinite; None if not given."""
     if len(values) == 1 and math.isinf(values[0]):
         return float(values[0])
-    return _single_value(values, what, -math.inf)
+    return _single_value(values, noun, -math.inf)

@@ -79,8 +79,8 @@ class TimeServices:
         while self._services:
             self._services.pop().shutdown("the simulation ends")
 
-    def _in_loop(self, what: str, work: Callable[[], Any]) -> Any:
-        return self._loop.requests.call(what, work, _RESPONSE_TIMEOUT_S)
+    def _in_loop(self, name: str, work: Callable[[], Any]) -> Any:
+        return self._loop.requests.call(name, work, _RESPONSE_TIMEOUT_S)
 
     def _on_hold(self, request: Any) -> HoldTimeResponse:
         holds = self._loop.holds

@@ -43,11 +43,11 @@ class RequestQueue:
         self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
         self._arrived = threading.Event()
 
-    def call(self, what: str, work: Callable[[], T], timeout_s: float) -> T:
+    def call(self, name: str, work: Callable[[], T], timeout_s: float) -> T:
         """Runs work in the loop's thread and waits for the result.
 
         Args:
-            what: Name of the work for the error message, for example "spawn_sdf_model".
+            name: Name of the work for the error message, for example "spawn_sdf_model".
             work: Function that is called in the loop's thread.
             timeout_s: Timeout of the start of the work [s of real time].
 
@@ -62,13 +62,13 @@ class RequestQueue:
             with request.lock:
                 request.abandoned = not request.started
             if request.abandoned:
-                raise LoopTimeoutError(f"the simulation loop did not start '{what}' within {timeout_s:g} s")
+                raise LoopTimeoutError(f"the simulation loop did not start '{name}' within {timeout_s:g} s")
             # Started work is completed, because a partial spawn cannot be undone.
             request.done.wait(timeout_s)
         if request.error is not None:
             raise request.error
         if not request.done.is_set():
-            raise LoopTimeoutError(f"the simulation loop did not complete '{what}' within {2 * timeout_s:g} s")
+            raise LoopTimeoutError(f"the simulation loop did not complete '{name}' within {2 * timeout_s:g} s")
         return request.result  # type: ignore[no-any-return]
 
     def post(self, work: Callable[[], Any]) -> None:

@@ -26,9 +26,9 @@ def description_files(path: Path, resources: Resources) -> tuple[Path, ...]:
         path: SDF file.
         resources: Folders and packages for included models, meshes and materials.
     """
-    found: dict[Path, None] = {}
-    _add_description(path, resources, found)
-    return tuple(found)
+    files: dict[Path, None] = {}
+    _add_description(path, resources, files)
+    return tuple(files)
 
 
 def files_in_description(text: str, resources: Resources) -> tuple[Path, ...]:
@@ -38,46 +38,46 @@ def files_in_description(text: str, resources: Resources) -> tuple[Path, ...]:
         text: URDF or SDF text.
         resources: Folders and packages for the references.
     """
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     try:
-        _add_named(parse_xml(text, ""), resources, found)
+        _add_named(parse_xml(text, ""), resources, files)
     except DescriptionError:
         return ()
-    return tuple(found)
+    return tuple(files)
 
 
-def _add_description(path: Path, resources: Resources, found: dict[Path, None]) -> None:
-    if path in found:  # also ends circles of includes
+def _add_description(path: Path, resources: Resources, files: dict[Path, None]) -> None:
+    if path in files:  # also ends circles of includes
         return
-    found[path] = None
+    files[path] = None
     try:
         root = read_xml(path)
         if root.tag in _SDF_TAGS:
             converted_version(root)
     except DescriptionError:
         return
-    _add_named(root, resources, found)
+    _add_named(root, resources, files)
 
 
-def _add_named(node: XmlNode, resources: Resources, found: dict[Path, None]) -> None:
+def _add_named(node: XmlNode, resources: Resources, files: dict[Path, None]) -> None:
     for child in node.children:
         try:
             if child.tag == "include":
                 model = resources.model_file(child, child.require("uri").text.strip())
-                _add_all([config for config in [model.parent / "model.config"] if config.is_file()], found)
-                _add_description(model, resources, found)
+                _add_all([config for config in [model.parent / "model.config"] if config.is_file()], files)
+                _add_description(model, resources, files)
             elif child.tag == "uri":
                 path = resources.resolve(child, child.text.strip())
-                _add_all(_material_files(path) if node.tag == "script" else _mesh_files(path), found)
+                _add_all(_material_files(path) if node.tag == "script" else _mesh_files(path), files)
             elif child.tag in ("mesh", "texture") and "filename" in child.attributes:
-                _add_all(_mesh_files(resources.resolve(child, child.attributes["filename"])), found)
+                _add_all(_mesh_files(resources.resolve(child, child.attributes["filename"])), files)
         except DescriptionError:
             continue
-        _add_named(child, resources, found)
+        _add_named(child, resources, files)
 
 
-def _add_all(paths: Iterable[Path], found: dict[Path, None]) -> None:
-    found.update(dict.fromkeys(path for path in paths if path.is_file()))
+def _add_all(paths: Iterable[Path], files: dict[Path, None]) -> None:
+    files.update(dict.fromkeys(path for path in paths if path.is_file()))
 
 
 def _mesh_files(path: Path) -> list[Path]:

@@ -162,7 +162,7 @@ def parse_material_script(text: str) -> dict[str, tuple[Colour, str]]:
     Returns:
         Colour and texture file ("" for none), by name of the material.
     """
-    found: dict[str, tuple[Colour | None, str]] = {}
+    materials: dict[str, tuple[Colour | None, str]] = {}
     name, depth = "", 0
     for token in _TOKEN.findall(_COMMENT.sub(" ", text)):
         words = token.split()
@@ -177,15 +177,15 @@ def parse_material_script(text: str) -> dict[str, tuple[Colour, str]]:
                 own, _, parent = " ".join(named).partition(":")
                 name = own.strip().strip('"')
                 if name:
-                    found[name] = found.get(parent.strip().strip('"'), (None, ""))
+                    materials[name] = materials.get(parent.strip().strip('"'), (None, ""))
             case ["diffuse", *numbers] if name and depth > 0:
-                found[name] = (_colour(numbers) or found[name][0], found[name][1])
-            case ["ambient", *numbers] if name and depth > 0 and found[name][0] is None:
-                found[name] = (_colour(numbers), found[name][1])
-            case ["texture", image, *_] if name and depth > 0 and not found[name][1]:
-                found[name] = (found[name][0], image.strip('"'))
+                materials[name] = (_colour(numbers) or materials[name][0], materials[name][1])
+            case ["ambient", *numbers] if name and depth > 0 and materials[name][0] is None:
+                materials[name] = (_colour(numbers), materials[name][1])
+            case ["texture", image, *_] if name and depth > 0 and not materials[name][1]:
+                materials[name] = (materials[name][0], image.strip('"'))
     white: Colour = (1.0, 1.0, 1.0, 1.0)
-    return {key: (colour or (white if image else GREY), image) for key, (colour, image) in found.items()}
+    return {key: (colour or (white if image else GREY), image) for key, (colour, image) in materials.items()}
 
 
 def _colour(words: list[str]) -> Colour | None:

@@ -13,7 +13,7 @@ from modular_framework_simulation.models.xml_nodes import XmlNode
 
 
 def sdf_sensor_elements(model: XmlNode, frames: FrameTree) -> tuple[SensorElement, ...]:
-    """Returns the sensor elements of an SDF model, without those of inner models.
+    """Returns the sensor elements of an SDF model, without the elements of inner models.
 
     Args:
         model: The <model> element.

@@ -108,7 +108,7 @@ class UrdfExtensions:
         node = self.find(link, "material")
         if node is None:
             return None
-        found = gazebo_material(node.text.strip())
-        if found is None:
+        material = gazebo_material(node.text.strip())
+        if material is None:
             self._notes.add(node, f"'{node.text.strip()}' is not a known material; the element has no effect")
-        return found
+        return material

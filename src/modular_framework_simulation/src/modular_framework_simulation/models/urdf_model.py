@@ -97,15 +97,15 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     )
 
 
-def collision_name(given: str, link: str, index: int) -> str:
+def collision_name(name: str, link: str, index: int) -> str:
     """Returns the name of a <collision>; for an empty name, the name that Gazebo assigns.
 
     Args:
-        given: Name in the description, often empty.
+        name: Name in the description, often empty.
         link: Name of the link.
         index: Index of the <collision> in the link, from 0.
     """
-    return given or (f"{link}_collision_{index}" if index else f"{link}_collision")
+    return name or (f"{link}_collision_{index}" if index else f"{link}_collision")
 
 
 def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:

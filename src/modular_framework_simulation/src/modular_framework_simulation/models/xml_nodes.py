@@ -69,8 +69,8 @@ class XmlNode:
         """
         child = self.find(tag)
         if child is None:
-            got = ", ".join(f"<{each.tag}>" for each in self.children) or "nothing"
-            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is required, got {got}")
+            children = ", ".join(f"<{each.tag}>" for each in self.children) or "nothing"
+            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is required, got {children}")
         return child
 
     def name(self) -> str:
@@ -109,13 +109,13 @@ class XmlNode:
         """Parses the text as one finite number."""
         return self.numbers(1)[0]
 
-    def choice(self, attribute: str, choices: type[Choice], what: str) -> Choice:
+    def choice(self, attribute: str, choices: type[Choice], noun: str) -> Choice:
         """Returns the value of an attribute as a member of an Enum.
 
         Args:
             attribute: Name of the attribute.
             choices: Enum class whose values are the allowed attribute values.
-            what: Description of the attribute for the error message.
+            noun: Description of the attribute for the error message.
 
         Raises:
             DescriptionError: The value is not an allowed value.
@@ -125,7 +125,7 @@ class XmlNode:
             return choices(value)
         except ValueError as error:
             allowed = ", ".join(each.value for each in choices)
-            raise DescriptionError(self.where, f"got {what} '{value}'", f"allowed: {allowed}") from error
+            raise DescriptionError(self.where, f"got {noun} '{value}'", f"allowed: {allowed}") from error
 
     def flag(self) -> bool:
         """Parses the text as a bool.

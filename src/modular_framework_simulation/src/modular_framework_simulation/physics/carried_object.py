@@ -48,8 +48,8 @@ class CarriedObject:
         carried = palm @ self._object_in_palm
         lever = _difference(carried.position, palm.position)
         step_s = self._engine.settings.time_step_s
-        # The velocity is the velocity at the end of the step. To second order, its tangent exceeds the arc by the same
-        # distance by which the tangent at the start, along which the object moved, falls short.
+        # `linear` and `angular` are the velocities at the end of the step, but the object moved along the tangent at
+        # the start. To second order, both tangents deviate from the arc by the same distance, in opposite directions.
         tangent = [step_s * (v + w) for v, w in zip(linear, cross(angular, lever), strict=True)]
         shift = _difference(
             (tangent[0], tangent[1], tangent[2]), _difference(carried.position, self._object_before.position)

@@ -314,12 +314,12 @@ class MujocoEngine(PhysicsEngine):
     def touches(self, number: int, index: int) -> list[Touch]:
         """Returns the contacts of a link with other bodies."""
         bodies, forces, distances = self._dynamics.contacts()
-        found = []
+        body_touches = []
         for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
             other = int(self._body_id_of[bodies[row, 1 - side]])
             if other != number:
-                found.append(Touch(other, float(forces[row]), float(distances[row])))
-        return found
+                body_touches.append(Touch(other, float(forces[row]), float(distances[row])))
+        return body_touches
 
     def touched(self, number: int) -> set[int]:
         """Returns the bodies that a body presses on."""
@@ -330,7 +330,7 @@ class MujocoEngine(PhysicsEngine):
     def contact_points(self, number: int, index: int) -> list[EngineContact]:
         """Returns the contact points of a link, with forces."""
         bodies, _, distances = self._dynamics.contacts()
-        found = []
+        points = []
         for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
             body, distance = int(bodies[row, 1 - side]), float(distances[row])
             other = int(self._body_id_of[body])
@@ -340,8 +340,8 @@ class MujocoEngine(PhysicsEngine):
             link = list(self._bodies[other].ids).index(body) - 1
             sign = 1.0 if side else -1.0
             (nx, ny, nz), (fx, fy, fz) = ((sign * each).tolist() for each in (normal, force))
-            found.append(EngineContact(other, link, position, (nx, ny, nz), distance, (fx, fy, fz)))
-        return found
+            points.append(EngineContact(other, link, position, (nx, ny, nz), distance, (fx, fy, fz)))
+        return points
 
     # Joints
 
@@ -369,10 +369,10 @@ class MujocoEngine(PhysicsEngine):
         rx, ry, rz = data.qvel[span.dofs].tolist()
         return (x, y, z, w), (rx, ry, rz)
 
-    def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
+    def set_ball_joint_state(self, number: int, index: int, rotation: Quaternion, rate: Vector3) -> None:
         """Sets rotation and angular velocity of a ball joint."""
         span, data = self._span(number, index), self._dynamics.data
-        data.qpos[span.positions], data.qvel[span.dofs] = wxyz(turn), rate
+        data.qpos[span.positions], data.qvel[span.dofs] = wxyz(rotation), rate
         self._dynamics.mark_moved()
 
     def release_ball_joint(self, number: int, index: int) -> None:

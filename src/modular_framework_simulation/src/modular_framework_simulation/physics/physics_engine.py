@@ -382,13 +382,13 @@ class PhysicsEngine(ABC):
         """Returns rotation (quaternion xyzw) and angular velocity [rad/s] of a ball joint."""
 
     @abstractmethod
-    def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
+    def set_ball_joint_state(self, number: int, index: int, rotation: Quaternion, rate: Vector3) -> None:
         """Sets the state of a ball joint.
 
         Args:
             number: Id of the body.
             index: Index of the joint.
-            turn: Rotation, quaternion xyzw.
+            rotation: Rotation, quaternion xyzw.
             rate: Angular velocity [rad/s].
         """
 

@@ -25,10 +25,10 @@ class PhysicsSettings:
             link. PyBullet uses more iterations if the masses of free bodies differ by more than 1:75.
         contact_erp: Fraction of a penetration that is corrected in one step. A falling object penetrates by up to one
             step of motion at the impact, and rebounds with up to this fraction of its velocity, so the value is low.
-        friction_erp: Fraction of a slip that is corrected in one step of sticking friction. Friction without
-            correction only stops the velocity, and the solver's errors accumulate. Contacts of fingers therefore have
-            friction anchors, to which they are drawn back while the force is within the friction cone. The engine also
-            keeps the normal of an anchor, so in a rotating gripper the anchors are renewed now and then.
+        friction_erp: Fraction of a slip that is corrected in one step of sticking friction. Friction without correction
+            only stops the velocity, and the solver's errors accumulate. Contacts of fingers therefore have friction
+            anchors, to which they are drawn back while the force is within the friction cone. The engine also keeps the
+            normal of an anchor, so the engine renews the anchors in a rotating gripper occasionally.
         contact_reach: Maximum distance of surfaces that may touch in the next step, and of two contacts that are
             merged, as a fraction of the smaller body's radius. The engine's default of 0.02 merges contacts of a
             shaking cube in the gripper, which creeps four times as far as with this value.

@@ -513,12 +513,12 @@ class PyBulletEngine(PhysicsEngine):
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
         """Returns rotation and angular velocity of a ball joint."""
-        turn, rate = self.api.getJointStateMultiDof(self._id(number), index, physicsClientId=self.client)[:2]
-        return turn, rate
+        rotation, rate = self.api.getJointStateMultiDof(self._id(number), index, physicsClientId=self.client)[:2]
+        return rotation, rate
 
-    def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
+    def set_ball_joint_state(self, number: int, index: int, rotation: Quaternion, rate: Vector3) -> None:
         """Sets rotation and angular velocity of a ball joint."""
-        self.api.resetJointStateMultiDof(self._id(number), index, turn, rate, physicsClientId=self.client)
+        self.api.resetJointStateMultiDof(self._id(number), index, rotation, rate, physicsClientId=self.client)
 
     def release_ball_joint(self, number: int, index: int) -> None:
         """Removes the engine's default motor of a ball joint."""

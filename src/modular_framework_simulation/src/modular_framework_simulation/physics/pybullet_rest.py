@@ -64,10 +64,10 @@ class Rest:
         self._lost: list[tuple[int, Callable[[], None]]] = []
         self._inside: set[int] = set()  # movable bodies that can sleep, except stored bodies
         self._loaded: set[int] = set()  # bodies restored since the last step
-        self._watched: set[int] = set()  # contacts of these bodies are read
-        self._corners: dict[tuple[int, int], tuple[Any, Any]] = {}  # at the last check, by body and link
-        self._checked = 0  # number of the step of this check
-        self._may_approach = False  # the next step needs a check
+        self._watched: set[int] = set()  # bodies whose contacts are read
+        self._corners: dict[tuple[int, int], tuple[Any, Any]] = {}  # link boxes at the last check, by body and link
+        self._checked = 0  # step number of the last check
+        self._may_approach = False  # whether the next step needs a check
 
     def adjust(self, settings: PhysicsSettings) -> None:
         """Applies new settings."""

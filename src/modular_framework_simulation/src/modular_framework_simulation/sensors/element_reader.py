@@ -131,15 +131,15 @@ class ElementReader:
         return list(dict.fromkeys(self._unread(self.node, "")))
 
     def _unread(self, node: XmlNode, path: str) -> list[str]:
-        found = []
+        paths = []
         for child in node.children:
             if id(child) in self._read and not child.children:
                 continue
             if id(child) in self._read or self._has_read(child):
-                found += self._unread(child, f"{path}{child.tag}/")
+                paths += self._unread(child, f"{path}{child.tag}/")
             else:
-                found.append(f"{path}{child.tag}")
-        return found
+                paths.append(f"{path}{child.tag}")
+        return paths
 
     def _has_read(self, node: XmlNode) -> bool:
         return any(id(child) in self._read or self._has_read(child) for child in node.children)

@@ -117,7 +117,7 @@ class Laser:
     def measure(self) -> npt.NDArray[np.float64]:
         """Returns the distances along the rays, shape (samples,) [m].
 
-        A distance is infinite if the ray hits nothing, and minus infinite if a shape is below `min_range` (REP 117).
+        A distance is infinity without a hit, and minus infinity if a shape is closer than `min_range` (REP 117).
         """
         sensor = self._sensor
         pose = self._world.entity_state(sensor.parent).pose @ sensor.pose

@@ -132,22 +132,22 @@ class ViewerNode:
         for message in feed.take():
             self._guard(feed.topic, lambda message=message: work(message))  # type: ignore[misc]
 
-    def _guard(self, what: str, work: Callable[[], None]) -> None:
+    def _guard(self, name: str, work: Callable[[], None]) -> None:
         """Runs a function; an exception is logged once, and the viewer continues."""
         try:
             work()
         except Exception as error:  # any node may publish invalid messages
             known = isinstance(error, SimulationError | ValueError)
             fault = str(error) if known else f"unexpected {type(error).__name__}: {error}"
-            if self._faults.get(what) != fault:
-                self._faults[what] = fault
-                rospy.logwarn("%s: %s", what, fault)
+            if self._faults.get(name) != fault:
+                self._faults[name] = fault
+                rospy.logwarn("%s: %s", name, fault)
 
-    def _is_due(self, what: str, period_s: float) -> bool:
+    def _is_due(self, name: str, period_s: float) -> bool:
         now_s = time.monotonic()
-        if now_s < self._due_s.get(what, 0.0):
+        if now_s < self._due_s.get(name, 0.0):
             return False
-        self._due_s[what] = now_s + period_s
+        self._due_s[name] = now_s + period_s
         return True
 
     def _search(self) -> None:
