@@ -163,7 +163,7 @@ def test_fields_of_requests_come_from_userdata_and_fields_of_the_answer_go_there
         ({"where": pose.pose, "who": "me"}, "'pose': there is no 'pose'; there are: position, "),
         ({"where": pose, "who": 3}, "do not fit modular_framework_core/AddPoseStampedRequest"),
         ({"where": None, "who": "me"}, "userdata 'where' is empty; add a previous state that writes the key"),
-        ({"who": "me"}, "'userdata.where.pose' refers to userdata that is not there"),
+        ({"who": "me"}, "'userdata.where.pose' refers to userdata that does not exist"),
     ):
         assert run(ask, **values)[0] == "fail"
         assert reason in ask.reason, ask.reason

@@ -163,7 +163,7 @@ def test_a_straight_line_is_moved_completely_or_not_at_all(arm: Arm) -> None:
     assert arm.position == 1.5
     state = CartesianMove(offset=(1.0, 0.0, 0.0))
     assert run(state, arm_commander=arm) == "fail"
-    assert "only 50.0% of it can be moved" in state.reason
+    assert "only 50.0% of the line can be moved" in state.reason
     assert arm.position == 1.5
     assert run(CartesianMove(offset=(1.0, 0.0, 0.0), min_fraction=0.5), arm_commander=arm) == "success"
     assert arm.position == 2.0

@@ -13,10 +13,10 @@ from actionlib.action_client import ClientGoalHandle
 class SteadyActionClient(actionlib.SimpleActionClient):
     """An actionlib.SimpleActionClient for servers that answer at once.
 
-    actionlib's client discards every message of the server that arrives before `send_goal` has returned, so that a
-    goal that is accepted or ends that early stays pending forever. This client delays such messages until then. It also
-    delays the next goal until the end of the previous goal is stored: `done_cb` is called before that, and a goal sent
-    in between would be marked as done. `done_cb` must therefore not wait for another thread that sends a goal.
+    actionlib's client discards every message of the server that arrives before `send_goal` has returned, so that a goal
+    that is accepted or ends that early stays pending forever. This client delays such messages until then. It also
+    delays the next goal until the end of the previous goal is stored: `done_cb` is called earlier, and a goal sent in
+    between would be marked as done. `done_cb` must therefore not wait for another thread that sends a goal.
     """
 
     def __init__(self, ns: str, action_spec: type[Any]) -> None:
@@ -40,7 +40,7 @@ def is_connected(client: actionlib.SimpleActionClient) -> bool:
 
 
 def unconnected_topics(client: actionlib.SimpleActionClient) -> list[str]:
-    """Returns the topics of an action on which a client and a server are not connected; empty if all are connected.
+    """Returns the topics of an action on which client and server are not connected; empty if all are connected.
 
     rospy counts a subscriber's connection before the publisher has accepted it, and a result published until then is
     lost. The publisher's name is known only after that, so the names are compared. Does not use rospy's clock. With

@@ -110,7 +110,7 @@ class SteadyActionServer(ActionServer):
     def publish_status(self) -> None:
         """Publishes the goal status, later if a goal is not reported yet.
 
-        A client that cancels an unreported goal would take a status without the goal for its loss.
+        A client that cancels an unreported goal would mistake a status without the goal for the loss of the goal.
         """
         with self.lock:
             now_s = time.monotonic()

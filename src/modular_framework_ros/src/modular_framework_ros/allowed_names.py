@@ -18,24 +18,24 @@ def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
     return f"allowed: {', '.join(names)}" if names else empty
 
 
-def closest(found: str, allowed: Iterable[str]) -> str | None:
+def closest(unknown: str, allowed: Iterable[str]) -> str | None:
     """Returns the allowed name that is closest to a name or contains it, or None."""
-    wanted = str(found).lower()
-    if len(wanted) > MAX_NAME_LENGTH:
+    lowered = str(unknown).lower()
+    if len(lowered) > MAX_NAME_LENGTH:
         return None
     by_lower = {text.lower(): text for text in map(str, allowed) if len(text) <= MAX_NAME_LENGTH}
-    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
-    if not matches and len(wanted) >= 3:
-        matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
+    matches = difflib.get_close_matches(lowered, list(by_lower), n=1, cutoff=0.65)
+    if not matches and len(lowered) >= 3:
+        matches = [name for name in by_lower if lowered in name or (len(name) >= 3 and name in lowered)][:1]
     return by_lower[matches[0]] if matches else None
 
 
-def misspelling(found: str, name: str) -> bool:
+def misspelling(text: str, name: str) -> bool:
     """Returns whether a text is probably a misspelling of a name, so that the text is no name of something else."""
-    return bool(difflib.get_close_matches(found.lower(), [name.lower()], cutoff=MISSPELLING_RATIO))
+    return bool(difflib.get_close_matches(text.lower(), [name.lower()], cutoff=MISSPELLING_RATIO))
 
 
-def nearest(found: str, allowed: Iterable[str]) -> str:
+def nearest(unknown: str, allowed: Iterable[str]) -> str:
     """Returns ``; did you mean 'x'?`` for the closest allowed name, or ""."""
-    name = closest(found, allowed)
+    name = closest(unknown, allowed)
     return f"; did you mean '{name}'?" if name is not None else ""

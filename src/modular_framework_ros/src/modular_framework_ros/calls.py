@@ -166,12 +166,12 @@ def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: 
     Raises:
         CallError: No server was connected in time, or the task was stopped.
     """
-    what = f"action server '{rospy.resolve_name(name)}'"
-    there = wait_for_start(lambda: is_connected(client) or stop_requested(), what, timeout_s)
+    label = f"action server '{rospy.resolve_name(name)}'"
+    there = wait_for_start(lambda: is_connected(client) or stop_requested(), label, timeout_s)
     if stop_requested():
-        raise _stop_error(what)
+        raise _stop_error(label)
     if not there:
-        raise CallError(f"{what} was not available within {timeout_s:.1f} s; start the node that offers it")
+        raise CallError(f"{label} was not available within {timeout_s:.1f} s; start the node that offers it")
 
 
 def wait_for_result(

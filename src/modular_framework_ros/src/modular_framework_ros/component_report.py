@@ -52,7 +52,7 @@ class ComponentReporter:
         """Reports the body of the with statement as a task; an exception is reported as its failure and re-raised.
 
         Args:
-            name: Name of the task, such as that of the method.
+            name: Name of the task, such as the name of the method.
         """
         work, started, wall = Work(), rospy.get_time(), time.monotonic()
         try:

@@ -3,8 +3,8 @@
 
 rospy reads the header of a connection before it accepts the next one. A client that sends nothing or another protocol,
 such as a port scanner or a caller of a dead node whose port is used again, would keep all further clients waiting until
-it closes its connection. In addition, rospy's queue holds five pending connections, and every service call needs one or
-two: Linux drops the sixth, and its client retries after a second.
+it closes its connection. In addition, rospy's queue holds five pending connections, and every service call opens one or
+two connections: Linux drops the sixth connection, and its client retries after a second.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ class NodeHandle(Protocol):
         """Returns the value of `key`, or `default` if it is not set."""
 
     def child(self, name: str) -> NodeHandle:
-        """Returns the handle of the namespace `name` below this one."""
+        """Returns the handle of the namespace `name` below this namespace."""
 
 
 def join_names(namespace: str, name: str) -> str:
@@ -66,13 +66,13 @@ class MappingNodeHandle:
         return self._find(key)[0]
 
     def get_param(self, key: str, default: Any = None) -> Any:
-        found, value = self._find(key)
-        return value if found else default
+        is_set, value = self._find(key)
+        return value if is_set else default
 
     def child(self, name: str) -> MappingNodeHandle:
-        found, value = self._find(name)
-        below = value if found and isinstance(value, Mapping) else {}
-        return MappingNodeHandle(below, join_names(self._namespace, name))
+        is_set, value = self._find(name)
+        parameters = value if is_set and isinstance(value, Mapping) else {}
+        return MappingNodeHandle(parameters, join_names(self._namespace, name))
 
 
 def read_number(handle: NodeHandle, key: str, default: float, minimum: float | None = 0.0) -> float:

@@ -44,7 +44,7 @@ class Declaration:
         doc: Meaning and unit.
         default: Value if the parameter is not set; None without a default.
         required: Whether the parameter must be set to a non-empty value.
-        required_with: Name of a parameter that makes this one required if it is not empty.
+        required_with: Name of a parameter that makes this parameter required if its value is not empty.
         at_least, at_most: Inclusive bounds of a number.
         above: Exclusive lower bound of a number.
         choices: Allowed values; empty if any value is allowed.
@@ -238,10 +238,10 @@ def parameters_below(package: str, name: str, private_handle: NodeHandle, root_h
 
 def existing_declaration(package: str, node: str) -> NodeDeclaration:
     """Returns the declared parameters of an executable or a plugin; raises DeclarationError if there are none."""
-    found = node_declaration(package, node)
-    if found is None:
+    declaration = node_declaration(package, node)
+    if declaration is None:
         raise DeclarationError(f"there is no {package}/parameters/{node}.yaml")
-    return found
+    return declaration
 
 
 @cache

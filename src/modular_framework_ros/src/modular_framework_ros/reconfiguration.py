@@ -55,7 +55,7 @@ class _Server(Server):
     """A server that rejects values that are not finite; dynamic_reconfigure accepts NaN and clamps infinity.
 
     Attributes:
-        caller: Name of the node that sent the latest request; "" before the first.
+        caller: Name of the node that sent the latest request; "" before the first request.
     """
 
     caller = ""
@@ -69,7 +69,7 @@ class _Server(Server):
             present = self.config.get(name, present)
             if not math.isfinite(config[name]):
                 rospy.logerr(
-                    "%s%s: got %s; allowed is %s to %s; %s stays",
+                    "%s%s: got %s; allowed: %s to %s; %s stays",
                     rospy.resolve_name(self.ns) + "/",
                     name,
                     config[name],
@@ -88,7 +88,7 @@ class Reconfiguration:
         """Stores the adjustable parameters.
 
         Args:
-            namespace: Absolute namespace, or one that begins with "~".
+            namespace: Absolute namespace, or a namespace that begins with "~".
             table: Adjustable parameters.
             holder: Object that has the settings.
             attribute: Name of the holder's attribute with the settings. The settings are a frozen dataclass that is
@@ -100,7 +100,7 @@ class Reconfiguration:
 
     @property
     def caller(self) -> str:
-        """Name of the node that sent the latest request; "" before the first."""
+        """Name of the node that sent the latest request; "" before the first request."""
         return self._server.caller if self._server is not None else ""
 
     def connect(self) -> None:
@@ -112,7 +112,7 @@ class Reconfiguration:
         self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 
     def refresh(self) -> None:
-        """Publishes the current settings after a change from elsewhere; does nothing before `connect`."""
+        """Publishes the current settings after a change by other means; does nothing before `connect`."""
         if self._server is None:
             return
         settings = getattr(self._holder, self._attribute)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes without switching threads for every subscriber.
 
-rospy passes each message to one thread per subscriber and releases the interpreter lock for each of them. Without that,
-the simulation, which sends the clock to every node, takes a sixth less processor time. Python's `socket.send` releases
-the lock even for a non-blocking socket, and reacquiring it takes as long as the system call.
+rospy passes each message to one thread per subscriber and releases the interpreter lock for each thread. With direct
+publishing, the simulation, which sends the clock to every node, takes a sixth less processor time. Python's
+`socket.send` releases the lock even for a non-blocking socket, and reacquiring it takes as long as the system call.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]
                 self._thread_sends = False
                 while not (self._begun or self._queue or self._connection.done):
                     self._cond_data_available.wait()
-                begun, self._begun = self._begun, b""
-                queue, self._queue = [begun, *self._queue] if begun else self._queue, []
+                started, self._begun = self._begun, b""
+                queue, self._queue = [started, *self._queue] if started else self._queue, []
                 self._thread_sends = True
             for data in queue:
                 try:

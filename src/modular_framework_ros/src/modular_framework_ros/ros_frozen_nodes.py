@@ -65,12 +65,12 @@ class _Watch:
             new = {name: master.lookupNode(name) for name in names if name not in self._processes}
         except (rosgraph.MasterException, OSError):
             return
-        kept = {
-            name: found
-            for name, found in self._processes.items()
-            if name in names and (not found or found.is_running())
+        running = {
+            name: process
+            for name, process in self._processes.items()
+            if name in names and (not process or process.is_running())
         }
-        self._processes = kept | (_processes_of(new) if new else {})
+        self._processes = running | (_processes_of(new) if new else {})
 
 
 def _processes_of(uris: dict[str, str]) -> dict[str, psutil.Process | None]:

@@ -18,5 +18,7 @@ def refuse(program: str, option: str, instead: str) -> int:
         The exit code of the node, 1.
     """
     rospy.init_node(program.partition("/")[2].partition(".")[0], anonymous=True)
-    rospy.logfatal("%s, asked for by %s, is refused: there is no such program here; %s", program, option, instead)
+    rospy.logfatal(
+        "%s, requested by %s, is refused: this framework does not have the program; %s", program, option, instead
+    )
     return 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracks the running goals of an action server; a new goal cancels those that use the same resources."""
+"""Tracks the running goals of an action server; a new goal cancels the goals that use the same resources."""
 
 from __future__ import annotations
 

@@ -28,46 +28,46 @@ class WaitReport:
     """Logs a long wait every ten seconds, and frozen nodes at once.
 
     Args:
-        what: Name of the missing item, or a function that returns it.
+        awaited: Name of the missing item, or a function that returns it.
         timeout_s: Maximum wait [s].
     """
 
-    def __init__(self, what: str | Callable[[], str], timeout_s: float) -> None:
-        self._what, self._timeout_s = what, timeout_s
-        self._begun_s = self._reported_s = time.monotonic()
+    def __init__(self, awaited: str | Callable[[], str], timeout_s: float) -> None:
+        self._awaited, self._timeout_s = awaited, timeout_s
+        self._started_s = self._reported_s = time.monotonic()
         self._frozen = ""
 
     def remind(self) -> None:
         """Logs the wait if ten seconds have passed since the last message, or if a node was found to be frozen."""
         now_s = time.monotonic()
-        frozen = frozen_nodes() if now_s - self._begun_s > WATCHED_AFTER_S else ""
+        frozen = frozen_nodes() if now_s - self._started_s > WATCHED_AFTER_S else ""
         if now_s - self._reported_s >= REPORT_PERIOD_S or frozen != self._frozen:
             self._reported_s, self._frozen = now_s, frozen
-            what = self._what if isinstance(self._what, str) else self._what()
+            awaited = self._awaited if isinstance(self._awaited, str) else self._awaited()
             rospy.logwarn(
                 "still waiting for %s after %.0f s (of %.0f s at most)%s",
-                what,
-                now_s - self._begun_s,
+                awaited,
+                now_s - self._started_s,
                 self._timeout_s,
                 f"; {frozen}" if frozen else "",
             )
 
 
 def wait_for_start(
-    condition: Callable[[], bool], what: str | Callable[[], str], timeout_s: float | None = None
+    condition: Callable[[], bool], awaited: str | Callable[[], str], timeout_s: float | None = None
 ) -> bool:
     """Waits for a condition that another node fulfils.
 
     Args:
         condition: Function that returns whether the condition is met.
-        what: Name of the missing item, or a function that returns it.
+        awaited: Name of the missing item, or a function that returns it.
         timeout_s: Maximum wait [s of real time]; None for the parameter ``/start_timeout``.
 
     Returns:
         Whether the condition was met in time; False as well if ROS shuts down.
     """
     limit_s = start_timeout() if timeout_s is None else timeout_s
-    report, end_s = WaitReport(what, limit_s), time.monotonic() + limit_s
+    report, end_s = WaitReport(awaited, limit_s), time.monotonic() + limit_s
     while not condition():
         if rospy.is_shutdown() or time.monotonic() >= end_s:
             return False

@@ -3,9 +3,10 @@
 
 Plans to the pregrasp pose, from there to the grasp pose, and from the grasp pose may be made at the same time by
 independent states. An arm has several joint solutions for a pose, so the end of one plan and the start of the next
-agree only if both use the same solution. The rule: each stage uses the solution nearest to that of the previous stage,
-and the first stage the solution nearest to the current position. A plan that starts at a stage computes the whole
-chain, with the fingers in their posture on arrival, and therefore finds the same solutions as the other plans.
+agree only if both use the same solution. Therefore, each stage uses the solution nearest to the solution of the
+previous stage, and the first stage uses the solution nearest to the current position. A plan that starts at a stage
+computes the whole chain, with the fingers in their posture on arrival, and therefore finds the same solutions as the
+other plans.
 """
 
 from __future__ import annotations

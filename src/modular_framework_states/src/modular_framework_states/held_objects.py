@@ -65,7 +65,7 @@ def object_poses(names: Collection[str]) -> dict[str, Pose]:
 
 
 def moved(before: Mapping[str, Pose], after: Mapping[str, Pose]) -> bool:
-    """Returns whether an object has moved by more than REST_M or turned by more than REST_RAD."""
+    """Returns whether an object has moved by more than REST_M or rotated by more than REST_RAD."""
     for name, pose in before.items():
         (start, turn), (end, turned) = (_arrays(item) for item in (pose, after[name]))
         if np.linalg.norm(end - start) > REST_M or 2.0 * np.arccos(min(abs(turn @ turned), 1.0)) > REST_RAD:

@@ -44,12 +44,12 @@ def fetch(kind: str, name: str) -> Any:
     service, service_type, name_field, message_field = _GET[kind]
     response = _call(service, service_type, service_type._request_class(**{name_field: name}))
     if not response.success:
-        what = (
+        problem = (
             f"no {kind.replace('_', ' ')} named '{name}' is stored"
             if name
             else (f"no anonymous {kind.replace('_', ' ')} is left")
         )
-        raise ManagerError(f"{what} (service '{rospy.resolve_name(service)}')")
+        raise ManagerError(f"{problem} (service '{rospy.resolve_name(service)}')")
     return getattr(response, message_field)
 
 

@@ -51,7 +51,7 @@ def with_userdata(value: Any, userdata: Any) -> Any:
             key, _, path = value.removeprefix(USERDATA_PREFIX).partition(".")
             if userdata is None or key not in userdata:
                 raise FillingError(
-                    f"'{value}' refers to userdata that is not there; add a previous state that writes '{key}', "
+                    f"'{value}' refers to userdata that does not exist; add a previous state that writes '{key}', "
                     "and list the key in input_keys"
                 )
             if userdata[key] is None:
@@ -72,19 +72,19 @@ def field_at(message: Any, path: str) -> Any:
         path: Field names and zero-based list indices, separated by dots; empty for the message itself.
 
     Raises:
-        FillingError: The field or item does not exist; the message lists those that do.
+        FillingError: The field or item does not exist; the message lists the existing fields or items.
     """
-    found = message
+    value = message
     for name in path.split(".") if path else ():
-        fields = list(getattr(found, "__slots__", ()))
+        fields = list(getattr(value, "__slots__", ()))
         if name in fields:
-            found = getattr(found, name)
-        elif isinstance(found, list | tuple) and name.isdecimal() and int(name) < len(found):
-            found = found[int(name)]
+            value = getattr(value, name)
+        elif isinstance(value, list | tuple) and name.isdecimal() and int(name) < len(value):
+            value = value[int(name)]
         else:
-            there = f"the items 0 to {len(found) - 1}" if isinstance(found, list | tuple) else ", ".join(fields)
+            there = f"the items 0 to {len(value) - 1}" if isinstance(value, list | tuple) else ", ".join(fields)
             raise FillingError(f"'{path}': there is no '{name}'; there are: {there or 'no fields'}")
-    return found
+    return value
 
 
 def plain(value: Any) -> Any:
@@ -111,11 +111,11 @@ def difference(message: Any, expected: Mapping[str, Any], where: str = "") -> st
         path = f"{where}{name}"
         if name not in getattr(message, "__slots__", ()):
             return f"{path} does not exist; there are {', '.join(getattr(message, '__slots__', ())) or 'no fields'}"
-        found = getattr(message, name)
+        actual = getattr(message, name)
         if isinstance(value, Mapping):
-            inner = difference(found, value, f"{path}.")
+            inner = difference(actual, value, f"{path}.")
             if inner:
                 return inner
-        elif plain(found) != value:
-            return f"{path} is {found!r}, expected {value!r}"
+        elif plain(actual) != value:
+            return f"{path} is {actual!r}, expected {value!r}"
     return ""

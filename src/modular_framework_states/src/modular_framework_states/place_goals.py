@@ -27,7 +27,7 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 SERVICE_TIMEOUT_S = 10.0
 APPROACH_M, MIN_APPROACH_M = 0.1, 0.03
 MIN_RETREAT = 0.5
-"""Least fraction of the way back to the pregrasp pose."""
+"""Minimum fraction of the path back to the pregrasp pose."""
 COMPONENTS = PlanningSceneComponents(
     PlanningSceneComponents.WORLD_OBJECT_NAMES
     | PlanningSceneComponents.WORLD_OBJECT_GEOMETRY
@@ -47,7 +47,7 @@ class PlaceScene:
         support: Planning scene id of the support.
         support_solids: Parts of the support in the planning frame.
         tip_link: Link whose pose a grasp gives.
-        retreat: Way from the grasp pose to the pregrasp pose in the frame of the tip link, shape (3,) [m].
+        retreat: Translation from the grasp pose to the pregrasp pose in the frame of the tip link, shape (3,) [m].
     """
 
     frame: str
@@ -78,10 +78,10 @@ def read_place_scene(commander: Any, grasp: Any, support: str) -> PlaceScene:
     scene = request_service("get_planning_scene", GetPlanningScene, request, SERVICE_TIMEOUT_S).scene
     held = [item for item in scene.robot_state.attached_collision_objects if is_named(item.object.id, grasp.object_id)]
     if len(held) != 1:
-        there = [item.object.id for item in scene.robot_state.attached_collision_objects]
-        what = f"'{grasp.object_id}'" if grasp.object_id else "one object"
-        raise PlaceError(f"the hand should hold {what}; attached objects: {', '.join(there) or 'none'}")
-    found = _only(support, scene.world.collision_objects)
+        attached_names = [item.object.id for item in scene.robot_state.attached_collision_objects]
+        expected = f"'{grasp.object_id}'" if grasp.object_id else "one object"
+        raise PlaceError(f"the hand should hold {expected}; attached objects: {', '.join(attached_names) or 'none'}")
+    support_object = _only(support, scene.world.collision_objects)
     tip_link, item = commander.group.tip_link, held[0].object
     tip, carrier = link_poses(commander, (tip_link, item.header.frame_id), SERVICE_TIMEOUT_S)
     in_tip = _rotation(tip.pose).inv() * _rotation(carrier.pose) * _rotation(item.pose)
@@ -91,22 +91,22 @@ def read_place_scene(commander: Any, grasp: Any, support: str) -> PlaceScene:
         held=item.id,
         solids=_solids(item, in_own_frame=True),
         orientation=_rotation(grasped) * in_tip,
-        support=found.id,
-        support_solids=_solids(found),
+        support=support_object.id,
+        support_solids=_solids(support_object),
         tip_link=tip_link,
         retreat=_rotation(grasped).inv().apply(_position(before) - _position(grasped)),
     )
 
 
 def _only(support: str, objects: Sequence[CollisionObject]) -> CollisionObject:
-    found = [item for item in objects if is_named(item.id, support)]
-    if len(found) != 1:
+    matches = [item for item in objects if is_named(item.id, support)]
+    if len(matches) != 1:
         known = sorted(item.id for item in objects)
         raise PlaceError(
-            f"{len(found)} objects of the planning scene are named '{support}'; {listing(known)}"
+            f"{len(matches)} objects of the planning scene are named '{support}'; {listing(known)}"
             f"{nearest(support, known)}"
         )
-    return found[0]
+    return matches[0]
 
 
 def _rotation(pose: Any) -> Rotation:
@@ -127,10 +127,10 @@ def _solids(message: CollisionObject, in_own_frame: bool = False) -> Sequence[Tr
             meshes=message.meshes,
             mesh_poses=message.mesh_poses,
         )
-    found = scene_object(message)
-    if found is None:
+    converted = scene_object(message)
+    if converted is None:
         raise PlaceError(f"'{message.id}' has no solid part; allowed: boxes, spheres, cylinders, cones and meshes")
-    return found.solids
+    return converted.solids
 
 
 def place_locations(scene: PlaceScene, poses: Sequence[PlacePose], fingers: Mapping[str, float]) -> list[PlaceLocation]:

@@ -29,7 +29,7 @@ UNLIMITED = (-math.inf, math.inf)
 
 
 class PlaceError(ValueError):
-    """The object cannot stand there; the text states what was found and what is allowed."""
+    """The object cannot stand on the support; the text has the found and the allowed values."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,7 +206,7 @@ def place_poses(
     region: TargetRegion,
     limits: PlaceLimits = FLAT,
 ) -> list[PlacePose]:
-    """Returns the poses of an object on a face: first the least tilted, then the most central, then the least turned.
+    """Returns the poses of an object on a face: first the least tilted, then the most central, then the least rotated.
 
     Args:
         solids: Parts of the object in its frame.
@@ -250,8 +250,8 @@ class _Stance:
 
     Attributes:
         rotation: Orientation in the world frame.
-        feet: Lowest corners relative to the centre of the object's box, shape (n, 2) [m].
-        height: Height of that centre above them [m].
+        feet: Lowest corners relative to the centre of the object's bounding box, shape (n, 2) [m].
+        height: Height of this centre above the lowest corners [m].
     """
 
     rotation: Rotation

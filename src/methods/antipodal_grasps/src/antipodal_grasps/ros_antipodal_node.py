@@ -21,7 +21,7 @@ class AntipodalMethod(ParameterisedMethod):
     declared_in = ("antipodal_grasps", "antipodal_grasp_generator")
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps in the order of :func:`antipodal_grasps`, followed by those with the hand turned by pi."""
+        """Returns the grasps in the order of :func:`antipodal_grasps`, then the same with the hand rotated by pi."""
         settings = read_antipodal_settings(self.read)
         return candidates_of(antipodal_grasps(query, settings), query.gripper, settings)
 

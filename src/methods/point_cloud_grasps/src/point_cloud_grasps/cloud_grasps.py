@@ -102,7 +102,7 @@ def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> l
 
     Args:
         query: Object with its position, known surroundings, and hand.
-        points: Points seen by the camera in the planning frame without those on the robot, shape (n, 3) [m].
+        points: Points seen by the camera, without points on the robot, in the planning frame, shape (n, 3) [m].
         settings: Feasibility limits.
 
     Returns:
@@ -164,7 +164,7 @@ def _own_points(query: GraspQuery, points: Array, spacing: float, settings: Clou
     """Returns whether each point above the support belongs to the object.
 
     These are the points in the object's region, without clusters that extend mostly outside. If too few points remain,
-    as for an object in contact with a larger one, all points in the region are returned.
+    as for an object in contact with a larger object, all points in the region are returned.
     """
     inside = object_region(query.target, settings).contains(points)
     labels = cluster_labels(points[:, :2], cluster_gap(spacing))

@@ -47,7 +47,7 @@ class SeenCloud:
 class CloudSource:
     """Receives point clouds; subscribes to the camera only while waiting, since a camera renders only for subscribers.
 
-    Subscribers: topic of the cloud (sensor_msgs/PointCloud2); those of :class:`Transforms` permanently.
+    Subscribers: topic of the cloud (sensor_msgs/PointCloud2); permanently, the topics of :class:`Transforms`.
     """
 
     def __init__(self) -> None:

@@ -36,9 +36,9 @@ TOPIC_PARAMETERS = ("~point_cloud_topic", "pointcloud_topic_name")
 class PointCloudMethod(ParameterisedMethod):
     """Antipodal grasps on a point cloud, which is received again for every object.
 
-    Parameters: those of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic`` (empty for the
-        topic in ``pointcloud_topic_name``), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,
-        ``robot_description``.
+    Parameters: the parameters of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic``
+        (empty for the topic in ``pointcloud_topic_name``), ``~cloud_timeout`` [s], ``~robot_padding`` [m],
+        ``origin_frame_name``, ``robot_description``.
     Subscribers: see :class:`CloudSource`.
     """
 
@@ -56,7 +56,7 @@ class PointCloudMethod(ParameterisedMethod):
         self._source.connect()
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps in the order of :func:`cloud_grasps`, followed by those with the hand turned by pi.
+        """Returns the grasps in the order of :func:`cloud_grasps`, then the same grasps with the hand rotated by pi.
 
         Raises:
             NoCandidatesError: The object has no feasible grasp; the message gives the reason.

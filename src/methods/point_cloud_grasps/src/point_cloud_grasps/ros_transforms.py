@@ -55,9 +55,9 @@ class Transforms:
 
         Args:
             frame: Target frame.
-            sources: Source frames; those without a transform near that time are omitted.
+            sources: Source frames; frames without a transform near this time are omitted.
             stamp: Requested time.
-            timeout_s: Maximum wait for transforms at that time [s of real time].
+            timeout_s: Maximum wait for transforms at this time [s of real time].
         """
         known = [source for source in sources if self._is_known(frame, source, rospy.Time(0))] or list(sources)
         wait_until(lambda: all(self._is_known(frame, source, stamp) for source in known), timeout_s)

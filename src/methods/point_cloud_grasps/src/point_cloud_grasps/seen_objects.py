@@ -29,7 +29,7 @@ def seen_objects(points: Array, crop: CropBox, settings: CloudSettings, seed: in
     """Returns the point clusters on the support whose centre is in the crop box, the largest first.
 
     Args:
-        points: Points seen by the camera in the planning frame without those on the robot, shape (n, 3) [m].
+        points: Points seen by the camera, without points on the robot, in the planning frame, shape (n, 3) [m].
         crop: Crop box in which objects are searched.
         settings: Settings of the support and the clusters.
         seed: Seed of the random number generator.

@@ -123,7 +123,7 @@ class _Slice:
 
     @classmethod
     def along(cls, yaw: float, surface: Surface, top: Array) -> _Slice:
-        """Turns the surface and its highest points (n, 3) into the axes of a closing direction."""
+        """Rotates the surface and its highest points (n, 3) into the axes of a closing direction."""
         closing = np.array([math.cos(yaw), math.sin(yaw)])
         across = np.array([math.sin(yaw), -math.cos(yaw)])
         x, y = surface.points[:, :2] @ closing, surface.points[:, :2] @ across
@@ -148,7 +148,7 @@ class _Slice:
 
 
 def _directions(surface: Surface, step: float) -> list[float]:
-    """Returns closing directions within half a turn: the object's sides first, then regular steps."""
+    """Returns closing directions within a range of pi: the object's sides first, then regular steps."""
     sides = [math.atan2(axis[1], axis[0]) % math.pi for axis in surface.axes if math.hypot(axis[0], axis[1]) > 0.9]
     fan = [index * step for index in range(max(1, round(math.pi / step)))]
     chosen: list[float] = []

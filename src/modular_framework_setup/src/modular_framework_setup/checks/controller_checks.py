@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks controllers against the robot and the groups, and MoveIt's controllers against the hardware's."""
+"""Checks controllers against the robot and the groups, and MoveIt's controllers against the hardware controllers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the controllers in a config package: MoveIt's and the hardware's."""
+"""Reads the controllers of MoveIt and of the hardware in a config package."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that no named state is in collision, and without named states, that the default state is not."""
+"""Checks that no named state is in collision; without named states, checks the default state instead."""
 
 from __future__ import annotations
 

@@ -70,13 +70,13 @@ class _SrdfChecker:
             if isinstance(element.tag, str) and element.tag not in ELEMENTS:
                 self._faults.add_unknown(self._location(element), "element", element.tag, ELEMENTS)
 
-    def _check_name(self, element: Element, key: str, what: str, allowed: Iterable[str]) -> bool:
+    def _check_name(self, element: Element, key: str, noun: str, allowed: Iterable[str]) -> bool:
         name = (element.get(key) or "").strip()
         if not name:
             self._faults.add(self._location(element), f"<{element.tag}> has no attribute '{key}'; add it")
             return False
         if name not in allowed:
-            self._faults.add_unknown(self._location(element), f"<{element.tag}>: {what}", name, allowed)
+            self._faults.add_unknown(self._location(element), f"<{element.tag}>: {noun}", name, allowed)
             return False
         return True
 
@@ -106,12 +106,12 @@ class _SrdfChecker:
     def _check_state_joint(self, item: Element, owner: str, group: PlanningGroup) -> None:
         name = item.get("name", "")
         if name not in group.joints:
-            what = f"{owner}: joint '{name}'"
+            label = f"{owner}: joint '{name}'"
             if name in self._tree.joints and not group.is_whole:
                 return
             if name in self._tree.joints:
                 allowed = ", ".join(group.active)
-                self._faults.add(self._location(item), f"{what} is not in the group; allowed: {allowed}; remove it")
+                self._faults.add(self._location(item), f"{label} is not in the group; allowed: {allowed}; remove it")
             else:
                 self._faults.add_unknown(self._location(item), f"{owner}: joint", name, group.active)
             return
@@ -202,8 +202,8 @@ class _SrdfChecker:
         for name, uses in unknown.items():
             element, key = uses[0]
             note = f" (and in {len(uses) - 1} more pairs)" if len(uses) > 1 else ""
-            what = f"<{element.tag}>{note}: {key}" if name else f"<{element.tag}>{note} has no attribute '{key}':"
-            self._faults.add_unknown(self._location(element), what, name, links)
+            label = f"<{element.tag}>{note}: {key}" if name else f"<{element.tag}>{note} has no attribute '{key}':"
+            self._faults.add_unknown(self._location(element), label, name, links)
         for tag in ("disable_default_collisions", "link_sphere_approximation"):
             for element in self._root.findall(tag):
                 self._check_name(element, "link", "link", links)

@@ -47,14 +47,14 @@ def check_tree(tree: RobotTree, faults: FaultList) -> None:
 
 
 def _check_names(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
-    for what, items in (("link", robot.links), ("joint", robot.joints)):
+    for noun, items in (("link", robot.links), ("joint", robot.joints)):
         count = Counter(item.name for item in items)
         seen = set()
         for item in items:
             if not item.name:
-                faults.add(tree.location(item.line), f"a {what} has no name; give it one")
+                faults.add(tree.location(item.line), f"a {noun} has no name; give it one")
             elif count[item.name] > 1 and item.name in seen:
-                faults.add(tree.location(item.line), f"{what} '{item.name}' exists twice; rename one of them")
+                faults.add(tree.location(item.line), f"{noun} '{item.name}' exists twice; rename one of them")
             seen.add(item.name)
     children: set[str] = set()
     for joint in robot.joints:

@@ -33,7 +33,7 @@ class Command:
     execute: Callable[[argparse.Namespace], int]
 
     def run(self, arguments: Sequence[str] | None) -> int:
-        """Runs the command with the given arguments, by default those of the process; returns the exit code."""
+        """Runs the command with the given arguments, by default the arguments of the process; returns the exit code."""
         parser = argparse.ArgumentParser(prog=self.name, description=self.description)
         self.add_arguments(parser)
         args = parser.parse_args(arguments)

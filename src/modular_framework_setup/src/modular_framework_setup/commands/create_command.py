@@ -54,7 +54,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     add_sampling_arguments(parser)
     parser.add_argument("--author", default="maintainer", help="maintainer in package.xml")
     parser.add_argument("--email", default="maintainer@example.com", help="maintainer's address in package.xml")
-    parser.add_argument("--yes", action="store_true", help="do not ask; confirm the parts found")
+    parser.add_argument("--yes", action="store_true", help="do not ask; accept the detected parts")
 
 
 def _create(args: argparse.Namespace) -> int:

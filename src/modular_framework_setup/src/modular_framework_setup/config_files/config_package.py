@@ -188,13 +188,13 @@ def read_config_package(folder: Path, faults: FaultList) -> ConfigPackage:
     return replace(package, xacro_arguments=settings.xacro_arguments(package.launch_arguments()))
 
 
-def _only(folder: Path, patterns: tuple[str, ...], what: str, faults: FaultList) -> Path | None:
+def _only(folder: Path, patterns: tuple[str, ...], noun: str, faults: FaultList) -> Path | None:
     files = sorted(path for pattern in patterns for path in (folder / "config").glob(pattern))
     if len(files) == 1:
         return files[0]
     faults.add(
         SourceLocation(str(folder / "config"), 1, 1),
-        f"{len(files)} files may be the {what} ({', '.join(path.name for path in files) or 'none is there'}); exactly "
+        f"{len(files)} files may be the {noun} ({', '.join(path.name for path in files) or 'none is there'}); exactly "
         f"one {' or '.join(patterns)} is required; name it in {SETTINGS}",
     )
     return None

@@ -93,28 +93,28 @@ def parameters_of(top: Mapping) -> Mapping:
     return top
 
 
-def read_number(node: Node, what: str, faults: FaultList) -> float | None:
+def read_number(node: Node, noun: str, faults: FaultList) -> float | None:
     """Returns a number, or None for anything else. Angles in rosparam's notation add no fault.
 
     Args:
         node: YAML node.
-        what: Name of the value, for messages.
+        noun: Name of the value, for messages.
         faults: Receives a fault.
     """
     value = node.value if isinstance(node, Scalar) else None
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     if not (isinstance(value, str) and (_ANGLE.fullmatch(value) or has_argument(value))):
-        faults.add(node.location, f"{what} is {kind_of(node)}; expected a number; correct it")
+        faults.add(node.location, f"{noun} is {kind_of(node)}; expected a number; correct it")
     return None
 
 
-def read_truth(node: Node, what: str, faults: FaultList) -> bool | None:
+def read_truth(node: Node, noun: str, faults: FaultList) -> bool | None:
     """Returns a truth value, or None with a fault for anything else.
 
     Args:
         node: YAML node.
-        what: Name of the value, for messages.
+        noun: Name of the value, for messages.
         faults: Receives a fault.
     """
     value = node.value if isinstance(node, Scalar) else None
@@ -124,5 +124,5 @@ def read_truth(node: Node, what: str, faults: FaultList) -> bool | None:
         value = _TRUTH.get(value.lower(), value)
     if isinstance(value, bool):
         return value
-    faults.add(node.location, f"{what} is {kind_of(node)}; expected true or false; correct it")
+    faults.add(node.location, f"{noun} is {kind_of(node)}; expected true or false; correct it")
     return None

@@ -80,7 +80,7 @@ def _closing_axis(centres: Array, motion: Array) -> Array:
 
 
 def _approach_axis(points: Array, closing: Array) -> Array:
-    """Returns the palm axis along which the fingers protrude furthest, made orthogonal to the closing axis."""
+    """Returns the palm axis along which the fingers protrude furthest, orthogonalized to the closing axis."""
     mean = points.mean(axis=0)
     axes = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
     best = max(axes, key=lambda axis: float(mean @ axis) - abs(float(axis @ closing)) * np.linalg.norm(mean))

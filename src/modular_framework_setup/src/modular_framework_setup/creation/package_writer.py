@@ -24,9 +24,9 @@ FRAMEWORK_FILES = (
 )  # fmt: skip
 
 
-def refuse_existing(into: Path, names: tuple[str, ...]) -> None:
+def refuse_existing(parent: Path, names: tuple[str, ...]) -> None:
     """Raises CreationError if one of the packages exists already."""
-    existing = [str(into / name) for name in names if (into / name).exists()]
+    existing = [str(parent / name) for name in names if (parent / name).exists()]
     if existing:
         raise CreationError(
             f"{' and '.join(existing)} {'exists' if len(existing) == 1 else 'exist'} already and will not be "
@@ -34,12 +34,12 @@ def refuse_existing(into: Path, names: tuple[str, ...]) -> None:
         )
 
 
-def write_packages(plan: RobotPlan, into: Path) -> tuple[Path, Path]:
+def write_packages(plan: RobotPlan, parent: Path) -> tuple[Path, Path]:
     """Writes the robot package and the config package.
 
     Args:
         plan: Content of the packages.
-        into: Parent folder of both packages.
+        parent: Parent folder of both packages.
 
     Returns:
         The folders of the robot package and of the config package.
@@ -48,19 +48,19 @@ def write_packages(plan: RobotPlan, into: Path) -> tuple[Path, Path]:
         CreationError: One of the packages exists already.
     """
     names = plan.choices.robot_package, plan.choices.config_package
-    refuse_existing(into, names)
+    refuse_existing(parent, names)
     templates = Path(find_package("modular_framework_setup")) / "templates"
     values = _values(plan)
     for kind, name in zip(("robot", "moveit_config"), names, strict=True):
-        _render(templates / kind, into / name, values)
-    robot = into / names[0]
+        _render(templates / kind, parent / name, values)
+    robot = parent / names[0]
     (robot / "urdf" / f"{plan.choices.name}.urdf").write_text(f'<?xml version="1.0"?>\n{plan.urdf}\n')
     for target, source in plan.copies.items():
         (robot / target).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, robot / target)
     if values["hand"]:
         _write_framework_files(plan, robot / "config")
-    return robot, into / names[1]
+    return robot, parent / names[1]
 
 
 @dataclass(frozen=True, slots=True)

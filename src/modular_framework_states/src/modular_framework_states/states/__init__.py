@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The states a task is made of: one class a file, the file named after the class."""
+"""States of tasks; each file has one class and is named after the class."""

@@ -33,7 +33,7 @@ class AllowManipulatorCollisions(FrameworkState):
     """Changes the allowed collisions of the manipulator; positive once the planning scene has accepted the change.
 
     Args:
-        allow: True allows collisions, False restores those of the robot description.
+        allow: True allows collisions, False restores the allowed collisions of the robot description.
         collision_type: Self-collision, object-collision, or empty to apply the current matrix.
         objects: Names of the objects; empty for all known objects: those that were added and, in simulation, all
             movable objects. ``userdata`` stands for the object of ``selected_grasp``.

@@ -90,16 +90,16 @@ class CallAction(FrameworkState):
     def _end(self, name: str, client: Any, status: int, expected: Mapping[str, Any], userdata: Any) -> str:
         """Returns the outcome of a goal that has ended."""
         result, stated_reason = client.get_result(), client.get_goal_status_text() or "no reason given"
-        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {stated_reason}"
+        label = f"action '{name}' ended as {GoalStatus.to_string(status)}: {stated_reason}"
         aborted = status == GoalStatus.ABORTED and self._rules.outcome_field
         if result is None or (status != GoalStatus.SUCCEEDED and not aborted):
-            return self.fail(what)
+            return self.fail(label)
         if RESULT_KEY in self.get_registered_output_keys():
             userdata[RESULT_KEY] = result
         wrong = difference(result, expected)
         if wrong:
             return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}, but {wrong}")
-        response = Response(message=result, what=what, reason=stated_reason, aborted=bool(aborted))
+        response = Response(message=result, what=label, reason=stated_reason, aborted=bool(aborted))
         return end_by_response(self, self._rules, response, userdata)
 
     def _type_of(self, name: str) -> Any:

@@ -71,7 +71,7 @@ class CartesianMove(FrameworkState):
             return self.stopped()
         if response.fraction < self._min_fraction - 1e-9 or not response.solution.joint_trajectory.points:
             return self.fail(
-                f"straight line: only {response.fraction:.1%} of it can be moved "
+                f"straight line: only {response.fraction:.1%} of the line can be moved "
                 f"({error_name(response.error_code.val)}), but {self._min_fraction:.1%} are required; the log of "
                 "move_group gives the end of the line and the reason"
             )

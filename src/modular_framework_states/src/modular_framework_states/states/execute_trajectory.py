@@ -54,7 +54,7 @@ class ExecuteTrajectory(FrameworkState):
     def execute(self, userdata: Any) -> str:
         """Checks the path and executes the trajectory."""
         commander = userdata.arm_commander
-        what = f"trajectory '{self._name or 'selected'}'"
+        label = f"trajectory '{self._name or 'selected'}'"
         try:
             trajectory = selected_or_named(self, userdata, "trajectory", self._name)
             trajectory = start_at_current(trajectory, commander.current_joints())
@@ -62,12 +62,12 @@ class ExecuteTrajectory(FrameworkState):
             if not fault and self._step:
                 fault = self._first_contact(commander, trajectory)
         except (ManagerError, CallError, ValueError) as error:
-            return self.fail(f"{what}: {error}")
+            return self.fail(f"{label}: {error}")
         if self.preempt_requested():
             return self.stopped()
         if fault:
-            return self.fail(f"{what} was not executed: {fault}")
-        return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, what)
+            return self.fail(f"{label} was not executed: {fault}")
+        return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, label)
 
     def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
         """Describes the first collision on the path; empty if the path is free."""
@@ -111,7 +111,7 @@ def start_at_current(trajectory: JointTrajectory, current: Mapping[str, float]) 
 
 
 def velocity_violation(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
-    """Describes the first segment that exceeds a joint's velocity limit; empty if none does.
+    """Describes the first segment that exceeds a joint's velocity limit; empty if all segments respect the limits.
 
     Args:
         trajectory: Points at increasing times.

@@ -47,7 +47,7 @@ class Gripper(FrameworkState):
 
     def execute(self, userdata: Any) -> str:
         """Moves the fingers."""
-        wanted = self._posture or ", ".join(f"{joint} {position}" for joint, position in self._positions.items())
+        target = self._posture or ", ".join(f"{joint} {position}" for joint, position in self._positions.items())
         try:
             positions = self._positions or posture_positions(self._posture)
             grasp = posture_grasp(positions, self._torque)
@@ -61,5 +61,5 @@ class Gripper(FrameworkState):
                 stop_requested=self.preempt_requested,
             )
         except (RobotModelError, GraspGoalError) as error:
-            return self.fail(f"gripper to {wanted}: {error}")
+            return self.fail(f"gripper to {target}: {error}")
         return self.succeed()

@@ -127,7 +127,7 @@ def message_joints(
         seed: {joint: position} [rad or m]; None for the current state.
 
     Raises:
-        ManagerError: The joint state has no positions, or their number differs from that of the names.
+        ManagerError: The joint state has no positions, or the numbers of positions and names differ.
         StageError: The pose cannot be reached.
     """
     if isinstance(message, JointState):

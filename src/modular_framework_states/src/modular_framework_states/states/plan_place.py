@@ -29,16 +29,16 @@ PLACE_ACTION, REGIONS_PARAMETER = "place", "/regions"
 SERVER_TIMEOUT_S, CANCEL_S = 10.0, 30.0
 FAULTS = (CallError, ManagerError, PlaceError, RobotModelError, SceneObjectError, ShapeError, StageError)
 GAP_M = 0.002
-"""Height above the support at which the object is released, so that it does not touch while it moves [m]."""
+"""Height above the support at which the object is released, so that a moving object does not touch the support [m]."""
 
 
 class PlanPlace(FrameworkState):
     """Plans to put the held object down; positive once two plans are stored: down to the place, and back from it.
 
     The object stands in one of its stable poses with the centre of its box in the region, as near as possible to the
-    orientation at the grasp and to the centre of the region. Its pose in the hand is that of the planning scene. The
-    approach comes from above; the retreat reverses the approach of the grasp, with the fingers open, so that the hand
-    does not tip the object. The action ``place`` of move_group plans the motions.
+    orientation at the grasp and to the centre of the region. The planning scene gives the pose of the object in the
+    hand. The approach comes from above; the retreat reverses the approach of the grasp, with the fingers open, so that
+    the hand does not tip the object. The action ``place`` of move_group plans the motions.
 
     Args:
         support: Model or planning scene object that the object is put on.
@@ -73,7 +73,7 @@ class PlanPlace(FrameworkState):
         self._plan_names, self._timeout_s = {"approach": approach_plan, "retreat": retreat_plan}, float(timeout)
 
     def execute(self, userdata: Any) -> str:
-        """Computes place poses, has the motions planned, and stores the plans."""
+        """Computes place poses, requests the plans of the motions, and stores the plans."""
         commander, grasp = userdata.arm_commander, userdata.selected_grasp
         if grasp is None:
             return self.fail("userdata 'selected_grasp' is empty; select the grasp that holds the object first")
@@ -114,7 +114,7 @@ class PlanPlace(FrameworkState):
         return goal
 
     def _planned(self, commander: Any, goal: PlaceGoal) -> tuple[Any, str]:
-        """Returns the result of the action, None without one, and its text."""
+        """Returns the result of the action, or None without a result, and the text of the action."""
         client = SteadyActionClient(PLACE_ACTION, PlaceAction)
         wait_for_action(client, PLACE_ACTION, SERVER_TIMEOUT_S)
         client.send_goal(goal)

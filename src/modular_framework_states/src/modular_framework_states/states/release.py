@@ -25,8 +25,9 @@ SCENE_PERIOD_S = 0.1
 class Release(FrameworkState):
     """Opens the manipulator wide; positive once the fingers are open and no object is attached to them.
 
-    The simulation detaches an object in the planning scene when the fingers have left it, and the state waits for that.
-    Without a simulation, the state detaches the object. With a rest time, the released objects must also come to rest.
+    The simulation detaches an object in the planning scene when the fingers have left the object, and the state waits
+    for this change. Without a simulation, the state detaches the object. With a rest time, the released objects must
+    also come to rest.
 
     Args:
         posture: Name of the widest posture, a state of the manipulator's planning group.
@@ -87,7 +88,7 @@ class Release(FrameworkState):
         return self.succeed()
 
     def _pass_time(self) -> None:
-        """Lets held simulated time pass, in which the simulation notices a release and the object comes to rest."""
+        """Advances held simulated time, so that the simulation detects a release and the object comes to rest."""
         if self._time.enabled:
             self._time.sleep(SCENE_PERIOD_S)
 

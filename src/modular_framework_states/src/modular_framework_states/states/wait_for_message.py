@@ -56,8 +56,8 @@ class WaitForMessage(FrameworkState):
         name = rospy.resolve_name(self._topic)
         arrived = self._wait(lambda: bool(published_type(name)), end, 0.1) and self._receive(name, end)
         if not arrived:
-            what = "no message as expected" if self._expected else "no message"
-            return self.fail(f"{what} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
+            problem = "no message as expected" if self._expected else "no message"
+            return self.fail(f"{problem} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
         if MESSAGE_KEY in self.get_registered_output_keys():
             userdata[MESSAGE_KEY] = self._found[0]
         return self.succeed()

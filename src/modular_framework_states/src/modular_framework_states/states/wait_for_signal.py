@@ -24,14 +24,14 @@ REASON_WAIT_S = 0.5
 class WaitForSignal(FrameworkState):
     """Waits for a Bool on a topic; True gives the positive outcome.
 
-    The state subscribes when it is constructed and uses the latest unread signal, even if that came before the
+    The state subscribes at its construction and uses the latest unread signal, even if the signal came before the
     execution. A component may give the reason of a False on ``<topic_name>/reason`` (std_msgs/String).
 
     A latched signal may come from an earlier task. A component that offers the service ``<topic_name>/renew``
     (std_srvs/Trigger) is called to renew the signal; its response replaces the signal.
 
     A component that has not yet published the topic has the time of the parameter ``/start_timeout`` to start;
-    `timeout` counts from then.
+    `timeout` begins when the component has started.
 
     Args:
         topic_name: Topic of the signal (std_msgs/Bool).
