@@ -78,7 +78,7 @@ def test_the_package_knows_nothing_of_this_project(user_packages: Path) -> None:
 
 
 def test_a_database_that_is_asked_for_is_refused_by_name_and_the_rest_starts(demo: Any) -> None:
-    until(lambda: "mongo_wrapper_ros.py, asked for by db:=true, is refused" in demo.log(), "the refusal")
+    until(lambda: "mongo_wrapper_ros.py, requested by db:=true, is refused" in demo.log(), "the refusal")
     assert "ConstraintsStorage" in demo.log() and demo.alive()
 
 

@@ -34,40 +34,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("words", nargs="+", help="package and file, or the path of a file; then argument:=value")
     parsed = parser.parse_args(arguments)
     try:
-        path, given = _file_and_arguments(parsed.words)
+        path, values = _file_and_arguments(parsed.words)
         if parsed.show_args:
             print(argument_listing(get_launch_description_from_any_launch_file(str(path))))
             return 0
     except LaunchError as error:
         get_logger().error("%s", error)
         return EXIT_BAD_LAUNCH
-    return run_launch_file(path, given)
+    return run_launch_file(path, values)
 
 
-def run_launch_file(path: Path, given: dict[str, str]) -> int:
+def run_launch_file(path: Path, values: dict[str, str]) -> int:
     """Runs a launch file to its end.
 
     Args:
         path: Path of the launch file.
-        given: Values of its arguments, by name.
+        values: Values of its arguments, by name.
 
     Returns:
         The exit code, see `LaunchService.run`.
     """
-    include = IncludeLaunchDescription(AnyLaunchDescriptionSource(str(path)), launch_arguments=given)
+    include = IncludeLaunchDescription(AnyLaunchDescriptionSource(str(path)), launch_arguments=values)
     include.where = "launch_py"
 
     def check(context: LaunchContext) -> None:
         known = LaunchDescription([include]).get_launch_arguments()
         declared = context.declared_arguments | {argument.name for argument in known}
-        unknown = [name for name in given if name not in declared | context.read_configurations]
+        unknown = [name for name in values if name not in declared | context.read_configurations]
         if unknown:
             raise LaunchError(
                 f"{path} has no argument '{unknown[0]}'{hint(unknown[0], declared)}; allowed: {listed(declared)}; "
                 "correct the name, or leave it out"
             )
 
-    service = LaunchService(argv=[f"{name}:={value}" for name, value in given.items()], check=check)
+    service = LaunchService(argv=[f"{name}:={value}" for name, value in values.items()], check=check)
     service.include_launch_description(LaunchDescription([include]))
     return service.run()
 
@@ -76,19 +76,19 @@ def _file_and_arguments(words: Sequence[str]) -> tuple[Path, dict[str, str]]:
     """Splits the words of a command line into the launch file and the values of its arguments."""
     first = next((index for index, word in enumerate(words) if ":=" in word), len(words))
     names, assignments = words[:first], words[first:]
-    given: dict[str, str] = {}
+    values: dict[str, str] = {}
     for assignment in assignments:
         name, separator, value = assignment.partition(":=")
         if not separator or not name:
             raise LaunchError(f"argument '{assignment}' does not have the form name:=value")
-        given[name] = value
+        values[name] = value
     match names:
         case [path] if Path(path).is_file():
-            return Path(path).resolve(), given
+            return Path(path).resolve(), values
         case [path, word, *_] if Path(path).is_file():
             raise LaunchError(f"argument '{word}' does not have the form name:=value; allowed: {USAGE}")
         case [package, file]:
-            return file_of_package(package, file), given
+            return file_of_package(package, file), values
         case [path] if "/" in path or path.endswith((".py", ".launch", ".xml")):
             raise LaunchError(f"file {Path(path).resolve()} does not exist; allowed: {USAGE}")
     raise LaunchError(f"got '{' '.join(names)}'; allowed: {USAGE}")
@@ -103,14 +103,15 @@ def file_of_package(package: str, file: str) -> Path:
     folder = Path(package_share_directory(package))
     if (folder / "launch" / file).is_file():
         return folder / "launch" / file
-    found = sorted(path for path in folder.rglob(Path(file).name) if path.is_file() and str(path).endswith(f"/{file}"))
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise LaunchError(f"package '{package}' has several files {file}: {listed(map(str, found))}; give a path")
-    there = sorted({path.name for path in folder.rglob("*") if path.name.endswith(ENDINGS)})
+    paths = sorted(path for path in folder.rglob(Path(file).name) if path.is_file() and str(path).endswith(f"/{file}"))
+    if len(paths) == 1:
+        return paths[0]
+    if paths:
+        raise LaunchError(f"package '{package}' has several files {file}: {listed(map(str, paths))}; give a path")
+    file_names = sorted({path.name for path in folder.rglob("*") if path.name.endswith(ENDINGS)})
     raise LaunchError(
-        f"package '{package}' ({folder}) has no launch file '{file}'{hint(file, there)}; known: {listed(there)}"
+        f"package '{package}' ({folder}) has no launch file '{file}'{hint(file, file_names)}; known: "
+        f"{listed(file_names)}"
     )
 
 

@@ -14,7 +14,7 @@ __all__ = [
 
 UNSUPPORTED = {
     "OnProcessIO": "processes write their output to the screen or to a log file, not through the launch",
-    "OnExecutionComplete": "use OnProcessExit for processes; other actions are complete when the next one is visited",
+    "OnExecutionComplete": "use OnProcessExit for processes; other actions end before the next action is visited",
     "OnIncludeLaunchDescription": "move the actions before the IncludeLaunchDescription",
 }
 """Unsupported event handlers of ROS 2, with the alternative for the error message."""

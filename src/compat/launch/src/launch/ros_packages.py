@@ -48,12 +48,12 @@ def program_of_package(package: str, program: str) -> str:
         LaunchError: The package does not have the executable.
     """
     package_share_directory(package)
-    found = roslib.packages.find_node(package, program, rospack=_current_finder())
-    if found:
-        return str(found[0])
-    there = programs_of_package(package)
+    paths = roslib.packages.find_node(package, program, rospack=_current_finder())
+    if paths:
+        return str(paths[0])
+    names = programs_of_package(package)
     raise LaunchError(
-        f"package '{package}' has no executable '{program}'{hint(program, there)}; known: {listed(there)}; correct "
+        f"package '{package}' has no executable '{program}'{hint(program, names)}; known: {listed(names)}; correct "
         "the name, or build the workspace and make the file executable (chmod +x)"
     )
 
@@ -63,11 +63,11 @@ def programs_of_package(package: str) -> set[str]:
     share = Path(package_share_directory(package))
     prefixes = [Path(each) for each in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if each]
     folders = [share, *(prefix / "lib" / package for prefix in [share.parent.parent, *prefixes])]
-    found = set()
+    names = set()
     for folder in folders:
         files = folder.rglob("*") if folder.is_dir() else ()
-        found |= {path.name for path in files if path.is_file() and os.access(path, os.X_OK)}
-    return found
+        names |= {path.name for path in files if path.is_file() and os.access(path, os.X_OK)}
+    return names
 
 
 def plugin_descriptions(package: str) -> list[Path]:

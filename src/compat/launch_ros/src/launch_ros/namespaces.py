@@ -48,9 +48,9 @@ def name_from(executable: str) -> str:
     return name if _WORD.match(name) else f"node_{name}"
 
 
-def _check(part: str, what: str, whole: str) -> None:
+def _check(part: str, noun: str, full_name: str) -> None:
     if not _WORD.match(part):
         raise LaunchError(
-            f"{what} '{whole}' is invalid; allowed: letters, digits and underscores, starting with a letter"
-            f"{'; give the namespace as namespace=...' if what == 'node name' and '/' in whole else ''}"
+            f"{noun} '{full_name}' is invalid; allowed: letters, digits and underscores, starting with a letter"
+            f"{'; give the namespace as namespace=...' if noun == 'node name' and '/' in full_name else ''}"
         )

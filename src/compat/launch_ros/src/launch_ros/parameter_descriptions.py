@@ -120,7 +120,7 @@ def read_yaml_mapping(path: Path) -> dict[str, Any]:
     return content
 
 
-def evaluate_value(context: LaunchContext, value: Any, value_type: Any, what: str) -> Any:
+def evaluate_value(context: LaunchContext, value: Any, value_type: Any, label: str) -> Any:
     """Returns a value with its substitutions performed.
 
     Texts from substitutions are parsed as YAML, as in ROS 2, unless `value_type` is str; XML remains a text. A list of
@@ -130,7 +130,7 @@ def evaluate_value(context: LaunchContext, value: Any, value_type: Any, what: st
         context: Launch context.
         value: Value in the launch file.
         value_type: Type of the value, see `ParameterValue`.
-        what: Name of the value for messages.
+        label: Name of the value for messages.
 
     Raises:
         LaunchError: The value is not a valid parameter value, or does not have the type.
@@ -138,17 +138,17 @@ def evaluate_value(context: LaunchContext, value: Any, value_type: Any, what: st
     if isinstance(value, ParameterValue):
         return value.evaluate(context)
     if isinstance(value, Substitution) or _is_single_text(value):
-        return _parsed(perform_text(context, value), value_type, what)
+        return _parsed(perform_text(context, value), value_type, label)
     if isinstance(value, Mapping):
         return {
-            perform_text(context, key): evaluate_value(context, inner, None, f"{what}/{key}")
+            perform_text(context, key): evaluate_value(context, inner, None, f"{label}/{key}")
             for key, inner in value.items()
         }
     if isinstance(value, list | tuple):
-        return _with_uniform_type([evaluate_value(context, inner, None, what) for inner in value])
+        return _with_uniform_type([evaluate_value(context, inner, None, label) for inner in value])
     if value_type is not None and isinstance(value, str):
-        return _parsed(value, value_type, what)
-    return _converted(value, value_type, what) if value_type is not None else value
+        return _parsed(value, value_type, label)
+    return _converted(value, value_type, label) if value_type is not None else value
 
 
 def _is_single_text(value: Any) -> bool:
@@ -167,7 +167,7 @@ def _with_uniform_type(values: list[Any]) -> list[Any]:
     return values
 
 
-def _parsed(text: str, value_type: Any, what: str) -> Any:
+def _parsed(text: str, value_type: Any, label: str) -> Any:
     """Parses a text as a value."""
     if value_type is str:
         return text
@@ -177,34 +177,34 @@ def _parsed(text: str, value_type: Any, what: str) -> Any:
         value = yaml.safe_load(text) if text else ""
     except yaml.YAMLError as error:
         raise LaunchError(
-            f"{what} is {_short(text)}, which is not valid YAML: {error}; to keep the text, write "
+            f"{label} is {_short(text)}, which is not valid YAML: {error}; to keep the text, write "
             "ParameterValue(..., value_type=str)"
         ) from None
     if value_type is not None:
-        return _converted(value, value_type, what)
+        return _converted(value, value_type, label)
     if value is None or isinstance(value, Mapping):
         raise LaunchError(
-            f"{what} is {_short(text)}, which YAML parses as {'nothing' if value is None else 'a mapping'}; to keep "
+            f"{label} is {_short(text)}, which YAML parses as {'nothing' if value is None else 'a mapping'}; to keep "
             "the text, write ParameterValue(..., value_type=str)"
         )
     return value
 
 
-def _converted(value: Any, value_type: Any, what: str) -> Any:
+def _converted(value: Any, value_type: Any, label: str) -> Any:
     """Converts a value to a type."""
     if typing.get_origin(value_type) is list:
         inner = typing.get_args(value_type)[0]
         if isinstance(value, list | tuple):
-            return [_converted(each, inner, what) for each in value]
+            return [_converted(each, inner, label) for each in value]
     elif value_type not in SCALARS:
         names = ", ".join(each.__name__ for each in SCALARS)
-        raise LaunchError(f"{what}: value_type is {value_type!r}; allowed: {names}, and lists of these (List[float])")
+        raise LaunchError(f"{label}: value_type is {value_type!r}; allowed: {names}, and lists of these (List[float])")
     elif value_type is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     elif isinstance(value, value_type) and not (value_type is int and isinstance(value, bool)):
         return value
-    wanted = getattr(value_type, "__name__", value_type) if value_type in SCALARS else value_type
-    raise LaunchError(f"{what} is {_short(value)} of type {type(value).__name__}; allowed: {wanted}; correct it")
+    type_name = getattr(value_type, "__name__", value_type) if value_type in SCALARS else value_type
+    raise LaunchError(f"{label} is {_short(value)} of type {type(value).__name__}; allowed: {type_name}; correct it")
 
 
 def _short(value: Any) -> str:

@@ -76,7 +76,7 @@ def main() -> int:
     roscpp_initialize(sys.argv)
     rospy.init_node("move_group_interface_cmdline", anonymous=True, disable_signals=True)
     parser = argparse.ArgumentParser(description="Commands move_group from a terminal.")
-    parser.add_argument("-i", "--interactive", action="store_true", help="read commands from the terminal (always so)")
+    parser.add_argument("-i", "--interactive", action="store_true", help="read commands from the terminal (default)")
     parser.add_argument("group_name", nargs="?", default="", help="planning group to command first")
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
     try:

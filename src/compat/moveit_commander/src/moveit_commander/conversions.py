@@ -29,7 +29,7 @@ def msg_from_string(msg: Any, data: bytes) -> None:
 
 
 def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
-    """Returns the rotations about the fixed axes x, y, z [rad] of a quaternion (xyzw); at pitch +-pi/2 the yaw is 0."""
+    """Returns the rotations about the fixed axes x, y, z [rad] of a quaternion (xyzw); the yaw is 0 at pitch +-pi/2."""
     if not math.hypot(*quaternion) >= 1e-9:  # also refuses NaN
         raise MoveItCommanderException(f"quaternion {list(quaternion)} has zero length; a unit quaternion is needed")
     return list(rotations.rpy_from_quaternion(quaternion))

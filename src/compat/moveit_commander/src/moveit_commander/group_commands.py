@@ -152,10 +152,10 @@ class GroupCommands:
             "replan": self.group.allow_replanning,
             "replanning": self.group.allow_replanning,
         }
-        what, value = words[0].lower(), words[1].lower()
-        if what not in switches or value not in (*TRUE, "0", "f", "false"):
+        setting, value = words[0].lower(), words[1].lower()
+        if setting not in switches or value not in (*TRUE, "0", "f", "false"):
             raise MoveItCommanderException(f"allow {' '.join(words)}: looking or replanning, true or false are allowed")
-        switches[what](value in TRUE)
+        switches[setting](value in TRUE)
         return OK
 
     def constrain(self, words: Words) -> Answer:

@@ -109,7 +109,7 @@ class GroupConnection:
         return [joint.name for joint in self._group.active_joints]
 
     def get_variable_names(self) -> list[str]:
-        """Returns the names of the group's variables; those of a planar or floating joint are "joint/variable"."""
+        """Returns the names of the group's variables; variables of a planar or floating joint are "joint/variable"."""
         return self._group_names()
 
     def get_variable_count(self) -> int:

@@ -56,7 +56,7 @@ class GroupJointTargets(GroupSettings):
                 joint or variable; or a Pose or PoseStamped, which compute_ik immediately converts to joint values.
             arg2: For a joint name, its value or a list of values per variable. For a pose, the link (str), or whether
                 an approximate solution suffices (bool).
-            arg3: For a pose, the remaining one of link and approximation.
+            arg3: For a pose, the link or the approximation flag, whichever `arg2` is not.
 
         Raises:
             MoveItCommanderException: A joint or link is unknown, a value is out of bounds, or the pose has no solution.
@@ -143,8 +143,8 @@ class GroupJointTargets(GroupSettings):
                 )
             if not joints[name].admits(float(value), self._joint_tolerance):
                 raise MoveItCommanderException(
-                    f"Error setting joint target. Is the target within bounds? Joint '{name}': got {value}, allowed "
-                    f"is [{joints[name].lower:.6g}, {joints[name].upper:.6g}]"
+                    f"Error setting joint target. Is the target within bounds? Joint '{name}': got {value}; allowed: "
+                    f"[{joints[name].lower:.6g}, {joints[name].upper:.6g}]"
                 )
         mimics = {name: mimic for name, mimic in self._model.mimics.items() if mimic.leader in joints}
         target = self._joint_target | with_leaders({name: float(value) for name, value in values.items()}, mimics)

@@ -87,7 +87,7 @@ class GroupMotion(GroupPoseTargets):
         if not isinstance(trajectory, RobotTrajectory):
             raise MoveItCommanderException(
                 f"execute: got {type(trajectory)}, a RobotTrajectory is needed; plan() "
-                "answers a tuple whose second item is one"
+                "returns a tuple whose second item is a RobotTrajectory"
             )
         caller = self._servers.action(EXECUTE_ACTION, ExecuteTrajectoryAction)
         if not wait:
@@ -169,11 +169,14 @@ class GroupMotion(GroupPoseTargets):
     def _planning_limit_s(self) -> float:
         return self._planning_time_s * max(1, self._attempts) + ANSWER_MARGIN_S + ACTION_TIMEOUT_S
 
-    def _check_result(self, code: MoveItErrorCodes, what: str) -> bool:
+    def _check_result(self, code: MoveItErrorCodes, action: str) -> bool:
         if code.val == MoveItErrorCodes.SUCCESS:
             return True
         rospy.logwarn(
-            "%s of group '%s' failed: %s; the log of move_group says why", what, self._group.name, code_text(code)
+            "%s of group '%s' failed: %s; the log of move_group gives the reason",
+            action,
+            self._group.name,
+            code_text(code),
         )
         return False
 

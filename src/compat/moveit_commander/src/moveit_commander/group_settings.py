@@ -219,6 +219,6 @@ class GroupSettings(GroupConnection):
 def _scaling_factor(value: float, limit: str) -> float:
     if not 0.0 < value <= 1.0:
         raise MoveItCommanderException(
-            f"Expected value in the range from 0 to 1 for scaling factor; got {value} for {limit}, allowed is (0, 1]"
+            f"Expected value in the range from 0 to 1 for scaling factor; got {value} for {limit}, allowed: (0, 1]"
         )
     return float(value)

@@ -25,7 +25,7 @@ from moveit_commander.planning_scene_interface import PlanningSceneInterface
 from moveit_commander.robot import RobotCommander
 
 GENERAL = {
-    "use": ("use [<group>|previous]", "command another group, or list those in use"),
+    "use": ("use [<group>|previous]", "command another group, or list the groups in use"),
     "trace": ("trace [on|off]", "show the lines of a file as they are executed"),
     "load": ("load [<file>]", "execute the commands of a file"),
     "save": ("save [<file>]", "write groups and remembered joint values as commands"),

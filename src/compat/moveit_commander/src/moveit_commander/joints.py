@@ -93,7 +93,7 @@ def root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str
 
 
 def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
-    """Returns a variable of a virtual joint, with MoveIt's bounds or those of joint_limits.yaml."""
+    """Returns a variable of a virtual joint, with the bounds of joint_limits.yaml or else MoveIt's bounds."""
     variable = name.rpartition("/")[2]
     bound = math.pi if variable == "theta" else 1.0 if variable.startswith("rot_") else math.inf
     part = Joint(

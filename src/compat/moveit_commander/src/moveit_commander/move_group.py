@@ -149,7 +149,7 @@ def _factor(kind: str, value: float) -> float:
     """Returns the scaling factor; as in MoveIt, a factor outside (0, 1] is replaced by 1 with a warning."""
     if 0.0 < value <= 1.0:
         return value
-    rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed is 0 < factor <= 1; 1 is used", kind, value)
+    rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed: 0 < factor <= 1; 1 is used", kind, value)
     return 1.0
 
 

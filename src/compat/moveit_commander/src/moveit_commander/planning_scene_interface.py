@@ -385,5 +385,5 @@ class PlanningSceneInterface:
             name = item.object.id if attached else item.id
             raise ServerError(
                 f"service {self._servers.resolve('apply_planning_scene')}: the change of object '{name}' "
-                "was refused and the scene is as before; the log of move_group says why"
+                "was refused and the scene is as before; the log of move_group gives the reason"
             )

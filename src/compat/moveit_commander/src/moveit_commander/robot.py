@@ -230,5 +230,5 @@ class RobotCommander:
             if name in self._model.links:
                 return self.get_link(name)
         raise AttributeError(
-            f"RobotCommander has no attribute '{name}', and the robot no group, joint or link of that name"
+            f"RobotCommander has no attribute '{name}', and the robot has no group, joint or link of this name"
         )

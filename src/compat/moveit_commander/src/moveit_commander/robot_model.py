@@ -160,10 +160,10 @@ class RobotModel:
     def _group(self, spec: GroupSpec) -> Group:
         name = spec.name
         try:
-            wanted = set(self._tree.group_joints(name, self._semantics))
+            joint_names = set(self._tree.group_joints(name, self._semantics))
         except GroupError as error:
             raise RobotModelError(f"{error} in robot '{self.name}'") from error
-        joints = tuple(joint for joint in self.joints.values() if joint.name in wanted)
+        joints = tuple(joint for joint in self.joints.values() if joint.name in joint_names)
         links = tuple(joint.child for joint in joints)
         is_chain = (
             bool(joints)

@@ -100,7 +100,7 @@ class CurrentState:
             timeout_s: Maximum wait [s].
 
         Raises:
-            ServerError: A needed joint was not received in time.
+            ServerError: A required joint was not received in time.
         """
         names = set(variables) or {variable.name for variable in self.model.variables}
         names = {self.model.mimics[name].leader if name in self.model.mimics else name for name in names}

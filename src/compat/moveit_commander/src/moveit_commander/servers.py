@@ -71,7 +71,7 @@ class Servers:
         try:
             return call_service(proxy, request, math.inf)
         except CallError as error:
-            raise ServerError(f"{error}; move_group's log says why") from error
+            raise ServerError(f"{error}; move_group's log gives the reason") from error
 
     def action(self, name: str, kind: Any, timeout_s: float = ACTION_TIMEOUT_S) -> ActionCaller:
         """Returns the connected client of an action.
@@ -146,7 +146,7 @@ class ActionCaller:
         if result is None:
             raise ServerError(
                 f"action {self.name}: ended without a result ({self._client.get_goal_status_text()}); "
-                "move_group's log says why"
+                "move_group's log gives the reason"
             )
         return result
 

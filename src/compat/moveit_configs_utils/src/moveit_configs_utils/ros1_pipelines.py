@@ -73,7 +73,7 @@ def _moveit1_name(name: str) -> str:
 def with_missing_keys(
     parameters: Mapping[str, Any], source: Mapping[str, Any], keys: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Returns the parameters, completed by those of a source.
+    """Returns the parameters, completed by the parameters of a source.
 
     Args:
         parameters: Parameters, which take precedence.

@@ -24,7 +24,7 @@ def read(kind: type[Message], data: bytes) -> Message:
         raise TypeError(
             f"Python argument types in a call of moveit_ros_planning_interface do not match: got "
             f"{type(data).__name__}, a serialized {getattr(kind, '_type', kind.__name__)} (bytes) is "
-            "needed; moveit_commander.conversions.msg_to_string makes one"
+            "needed; create the bytes with moveit_commander.conversions.msg_to_string"
         )
     message = kind()
     conversions.msg_from_string(message, data)

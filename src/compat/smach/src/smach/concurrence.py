@@ -89,7 +89,7 @@ class Concurrence(Container):
         return state
 
     def check_consistency(self) -> None:
-        """Raises an error without states, or if the outcome map names unknown outcomes or states."""
+        """Raises an error if there are no states, or if the outcome map names unknown outcomes or states."""
         if not self._states:
             raise InvalidStateError("the concurrence has no states")
         faults = []
@@ -252,7 +252,7 @@ class Concurrence(Container):
                     self._states[label].request_preempt()
 
     def _decide(self, outcomes: dict[str, str | None]) -> str:
-        """Returns the outcome of the concurrence from those of its children."""
+        """Returns the outcome of the concurrence for the outcomes of its children."""
         if is_shutdown() and not all(
             outcome in self._states[label].get_registered_outcomes() for label, outcome in outcomes.items()
         ):
@@ -279,7 +279,7 @@ class Concurrence(Container):
         return chosen
 
     def _settle_preempt(self) -> None:
-        """Acknowledges a preemption request after all children have; withdraws requests that remain."""
+        """Acknowledges a preemption request after all children have acknowledged it; withdraws remaining requests."""
         leftovers = self._recall_leftovers()
         if self._preempt_requested and not leftovers:
             self.service_preempt()

@@ -83,7 +83,7 @@ class Iterator(Container):
         self._items_label = it_label
 
     def check_consistency(self) -> None:
-        """Raises an error without a state, or if an ending outcome is not an outcome of the iterator."""
+        """Raises an error if there is no state, or if an ending outcome is not an outcome of the iterator."""
         if not isinstance(self._state, State):
             raise InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
         registered = self._state.get_registered_outcomes()

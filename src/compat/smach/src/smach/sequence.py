@@ -12,7 +12,7 @@ __all__ = ["Sequence"]
 
 
 class Sequence(StateMachine):
-    """Connects each state's connector outcome to the next state; the last state's one ends the sequence."""
+    """Connects each state's connector outcome to the next state, and the last state's to the end of the sequence."""
 
     def __init__(
         self, outcomes: Names, connector_outcome: str, input_keys: Names = (), output_keys: Names = ()

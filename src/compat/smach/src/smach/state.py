@@ -45,7 +45,7 @@ class State:
 
     # ---- interface -----------------------------------------------------------------------------------------
     def register_outcomes(self, new_outcomes: Names) -> None:
-        """Adds outcomes to those the state may return."""
+        """Adds outcomes that the state may return."""
         self._outcomes.update(dict.fromkeys(new_outcomes))
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
@@ -76,11 +76,11 @@ class State:
 
     # ---- stopping ------------------------------------------------------------------------------------------
     def request_preempt(self) -> None:
-        """Requests the state to stop, which it does when its ``execute`` checks ``preempt_requested``."""
+        """Requests a stop; the state stops when its ``execute`` checks ``preempt_requested``."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Acknowledges the preemption request; called by the state that stops because of it."""
+        """Acknowledges the preemption request; called by the stopping state."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:

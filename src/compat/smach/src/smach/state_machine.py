@@ -123,7 +123,7 @@ class StateMachine(Container):
             )
 
     def check_consistency(self) -> None:
-        """Raises an error without states, or with all transitions that have an unknown target."""
+        """Raises an error if there are no states, or an error that lists all transitions with an unknown target."""
         if not self._states:
             raise InvalidStateError("the state machine has no states")
         if self._initial_label is not None and self._initial_label not in self._states:
@@ -235,7 +235,7 @@ class StateMachine(Container):
             self.call_transition_cbs()
 
     def _enter(self, label: str) -> None:
-        """Sets the current state; forwards a preemption request of the machine to it."""
+        """Sets the current state, and forwards a preemption request of the machine to this state."""
         with self._lock:
             self._current_label = label
             if self._preempt_requested:
@@ -243,7 +243,7 @@ class StateMachine(Container):
                 self._states[label].request_preempt()
 
     def _settle_preempt(self, label: str, state: State) -> None:
-        """Acknowledges the request of the machine once the preempted state has acknowledged its own."""
+        """Acknowledges the request of the machine once the preempted state has acknowledged its request."""
         with self._lock:
             if self._preempted_label != label:
                 return

@@ -135,10 +135,10 @@ class Const:
     def __repr__(self) -> str:
         return f"Const({object.__getattribute__(self, '_obj')!r})"
 
-    def _refusal(self, what: str) -> TypeError:
+    def _refusal(self, action: str) -> TypeError:
         kind = type(object.__getattribute__(self, "_obj")).__name__
         return TypeError(
-            f"a state tried to {what} a {kind} that it declared as an input key only, which makes it read-only; "
+            f"a state tried to {action} a {kind} that it declared as an input key only, which makes it read-only; "
             "declare the key in io_keys to use the object itself"
         )
 

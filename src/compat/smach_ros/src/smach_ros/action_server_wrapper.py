@@ -47,7 +47,7 @@ class ActionServerWrapper:
             action_spec: Action class, such as ``FibonacciAction``.
             wrapped_container: Container to execute, which declares its userdata keys as input and output keys.
             succeeded_outcomes: Outcomes for which the goal succeeded.
-            aborted_outcomes: Outcomes for which the goal is aborted, like outcomes of no list.
+            aborted_outcomes: Outcomes for which the goal is aborted; an outcome in no list aborts the goal, too.
             preempted_outcomes: Outcomes for which the goal is preempted.
             goal_key: Userdata key of the goal.
             feedback_key: Userdata key of the feedback, which is published at each transition.
@@ -90,19 +90,19 @@ class ActionServerWrapper:
             empty = action.action_goal.goal, action.action_feedback.feedback, action.action_result.result
         except (AttributeError, TypeError) as error:
             raise smach.InvalidConstructionError(
-                f"action_spec of '{self._server_name}' must be the class of an action as FibonacciAction, "
+                f"action_spec of '{self._server_name}' must be the class of an action such as FibonacciAction, "
                 f"got {self._action_spec!r}"
             ) from error
         self.userdata[self._goal_key] = empty[0] if goal is None else goal
         self.userdata[self._feedback_key] = empty[1]
         self.userdata[self._result_key] = empty[2]
 
-    def _checked(self, what: str, key: str, slots_map: Mapping[str, str] | None) -> dict[str, str]:
+    def _checked(self, label: str, key: str, slots_map: Mapping[str, str] | None) -> dict[str, str]:
         message = self.userdata[key]
         unknown = [slot for slot in slots_map or {} if slot not in message.__slots__]
         if unknown:
             raise smach.InvalidConstructionError(
-                f"{what} of '{self._server_name}': {unknown} are no fields of {message._type}; "
+                f"{label} of '{self._server_name}': {unknown} are no fields of {message._type}; "
                 f"its fields are {list(message.__slots__)}"
             )
         return dict(slots_map or {})

@@ -85,23 +85,23 @@ class UserCallback:
             raise ExchangeError(f"{self._what} raised {type(error).__name__}: {error}") from error
 
 
-def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...]:
+def check_slots(label: str, message: Any, slots: Iterable[str]) -> tuple[str, ...]:
     """Returns names of fields; raises ``smach.InvalidStateError`` for unknown fields.
 
     Args:
-        what: Name of the argument in errors.
+        label: Name of the argument in errors.
         message: Message with the allowed fields.
         slots: Names of fields.
     """
     if isinstance(slots, str):
-        raise smach.InvalidStateError(f"{what} must be a list of field names, got the string '{slots}'")
-    given = tuple(slots)
-    unknown = [name for name in given if name not in message.__slots__]
+        raise smach.InvalidStateError(f"{label} must be a list of field names, got the string '{slots}'")
+    names = tuple(slots)
+    unknown = [name for name in names if name not in message.__slots__]
     if unknown:
         raise smach.InvalidStateError(
-            f"{what}: {unknown} are no fields of {message._type}; its fields are {list(message.__slots__)}"
+            f"{label}: {unknown} are no fields of {message._type}; its fields are {list(message.__slots__)}"
         )
-    return given
+    return names
 
 
 class _MessageRules:
@@ -141,7 +141,7 @@ class MessageSource(_MessageRules):
         Args:
             what: Role of the message: "goal" or "request".
             empty: Empty message of the required type.
-            fixed: Initial message without a key; None for an empty one.
+            fixed: Initial message without a key; None for an empty message.
             key: Userdata key of the whole message; None for no key.
             slots: Fields that are read from userdata keys of the same names.
             callback: Function that receives (userdata, message) and may return a replacement.
@@ -242,7 +242,7 @@ class ServerCallState(smach.State):
     def __init__(
         self, input_keys: Iterable[str], output_keys: Iterable[str], io_keys: Iterable[str], outcomes: Iterable[str]
     ) -> None:
-        """Declares the keys, and the outcomes succeeded, aborted, preempted and those of the user."""
+        """Declares the keys, the outcomes succeeded, aborted and preempted, and the user's outcomes."""
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, io_keys)
         self.reason = ""
         self._keys = (self.get_registered_input_keys(), self.get_registered_output_keys())

@@ -51,7 +51,7 @@ class MonitorState(smach.State):
         super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, io_keys)
         if not hasattr(msg_type, "_md5sum"):
             raise smach.InvalidStateError(
-                f"msg_type of '{topic}' must be the class of a message as std_msgs.msg.Bool, got {msg_type!r}"
+                f"msg_type of '{topic}' must be the class of a message such as std_msgs.msg.Bool, got {msg_type!r}"
             )
         if not callable(cond_cb):
             raise smach.InvalidStateError(f"cond_cb of '{topic}' is a {type(cond_cb).__name__}; give a function")

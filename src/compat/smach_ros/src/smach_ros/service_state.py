@@ -47,7 +47,7 @@ class ServiceState(ServerCallState):
         Args:
             service_name: Name of the service.
             service_spec: Service class, such as ``std_srvs.srv.Trigger``.
-            request: Request, or its initial value; None for an empty one.
+            request: Request before the changes by keys and callback; None for an empty request.
             request_cb: Function that receives (userdata, request, *args, **kwargs); may change or replace the request.
             request_cb_args: Additional positional arguments of ``request_cb``.
             request_cb_kwargs: Additional keyword arguments of ``request_cb``.
@@ -113,6 +113,6 @@ def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:
         return service_spec._request_class(), service_spec._response_class()
     except (AttributeError, TypeError) as error:
         raise smach.InvalidStateError(
-            f"service_spec of '{service_name}' must be the class of a service as std_srvs.srv.Trigger, "
+            f"service_spec of '{service_name}' must be the class of a service such as std_srvs.srv.Trigger, "
             f"got {service_spec!r}"
         ) from error

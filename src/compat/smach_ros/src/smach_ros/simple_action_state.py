@@ -55,7 +55,7 @@ class SimpleActionState(ServerCallState):
         Args:
             action_name: Name of the action.
             action_spec: Action class, such as ``FibonacciAction``.
-            goal: Goal, or its initial value; None for an empty one.
+            goal: Goal before the changes by keys and callback; None for an empty goal.
             goal_key: Userdata key of the goal.
             goal_slots: Goal fields that are read from userdata keys of the same names.
             goal_cb: Function that receives (userdata, goal, *args, **kwargs) and may modify or replace the goal.
@@ -207,7 +207,8 @@ def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
         return action.action_goal.goal, action.action_result.result
     except (AttributeError, TypeError) as error:
         raise smach.InvalidStateError(
-            f"action_spec of '{action_name}' must be the class of an action as FibonacciAction, got {action_spec!r}"
+            f"action_spec of '{action_name}' must be the class of an action such as FibonacciAction, "
+            f"got {action_spec!r}"
         ) from error
 
 

@@ -63,7 +63,7 @@ def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
         except Exception:  # the value is modified concurrently, or nested infinitely
             fits = False
         if not fits and strict:
-            raise UserdataError(f"userdata '{key}' is a {type(value).__name__}; allowed are plain values and messages")
+            raise UserdataError(f"userdata '{key}' is a {type(value).__name__}; allowed: plain values and messages")
         written[key] = value if fits else f"<{type(value).__module__}.{type(value).__qualname__}>"
     return base64.b64encode(pickle.dumps(written, PROTOCOL)).decode("ascii")
 
@@ -92,7 +92,7 @@ def decode(text: str) -> dict[str, Any]:
 def _bytes_from_text(text: str, encoding: str) -> bytes:
     """Replaces ``_codecs.encode``, which protocol 2 uses to store bytes."""
     if encoding != "latin1":
-        raise UserdataError(f"userdata holds bytes as '{encoding}'; allowed is latin1")
+        raise UserdataError(f"userdata holds bytes as '{encoding}'; allowed: latin1")
     return text.encode("latin1")
 
 
@@ -120,4 +120,4 @@ class _PlainUnpickler(pickle.Unpickler):
             found = getattr(importlib.import_module(module), name, None)
             if isinstance(found, type) and issubclass(found, genpy.Message):
                 return found
-        raise UserdataError(f"userdata holds a '{module}.{name}'; allowed are plain values and messages")
+        raise UserdataError(f"userdata holds a '{module}.{name}'; allowed: plain values and messages")

@@ -18,11 +18,11 @@ POLL_PERIOD_S = 0.02
 """Polling period of a waiting state [s]."""
 
 
-def seconds(what: str, duration: object) -> float | None:
+def seconds(label: str, duration: object) -> float | None:
     """Returns a duration in seconds; None (no limit) stays None.
 
     Args:
-        what: Name of the argument in the error.
+        label: Name of the argument in the error.
         duration: ``rospy.Duration`` or number [s].
 
     Raises:
@@ -34,7 +34,7 @@ def seconds(what: str, duration: object) -> float | None:
         value = duration.to_sec() if isinstance(duration, rospy.Duration) else float(duration)
         if value >= 0.0:
             return value
-    raise smach.InvalidStateError(f"{what} must be a rospy.Duration of at least 0 s, or None; got {duration!r}")
+    raise smach.InvalidStateError(f"{label} must be a rospy.Duration of at least 0 s, or None; got {duration!r}")
 
 
 def going_down() -> bool:

@@ -143,9 +143,9 @@ class IncludeLaunchDescription(Action):
                 )
 
 
-def _check_declared(description: LaunchDescription, given: Iterable[str], path: str) -> None:
+def _check_declared(description: LaunchDescription, names: Iterable[str], path: str) -> None:
     declared = [argument.name for argument in description.get_launch_arguments()]
-    for name in given:
+    for name in names:
         if name not in declared:
             raise LaunchError(
                 f"{path} has no argument '{name}'{hint(name, declared)}; allowed: {listed(declared)}; correct or "

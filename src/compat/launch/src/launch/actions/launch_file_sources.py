@@ -74,8 +74,8 @@ def _existing(path_text: str) -> Path:
     if path.is_file():
         return path
     beside = sorted(each.name for each in path.parent.iterdir()) if path.parent.is_dir() else []
-    there = f"{path.parent} contains: {', '.join(beside)}" if beside else f"folder {path.parent} does not exist"
-    raise InvalidLaunchFileError(f"{path}: there is no such file{hint(path.name, beside)}; {there}; correct the path")
+    content = f"{path.parent} contains: {', '.join(beside)}" if beside else f"folder {path.parent} does not exist"
+    raise InvalidLaunchFileError(f"{path}: there is no such file{hint(path.name, beside)}; {content}; correct the path")
 
 
 def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:

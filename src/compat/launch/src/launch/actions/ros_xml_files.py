@@ -86,8 +86,8 @@ class XmlLaunchFile(Action):
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         configurations = context.launch_configurations
-        given = {name: str(configurations[name]) for name in self._names if name in configurations}
-        config = self._load(given, configurations.get(NAMESPACE), configurations.get(REMAPPINGS, ()))
+        values = {name: str(configurations[name]) for name in self._names if name in configurations}
+        config = self._load(values, configurations.get(NAMESPACE), configurations.get(REMAPPINGS, ()))
         for name in config.clear_params:
             context.parameters.clear(name)
         for name, parameter in config.params.items():
@@ -103,15 +103,15 @@ class XmlLaunchFile(Action):
             context.requests.append(request)
         return []
 
-    def _load(self, given: Mapping[str, str], namespace: str | None, remappings: Any) -> Any:
+    def _load(self, values: Mapping[str, str], namespace: str | None, remappings: Any) -> Any:
         """Reads the file with roslaunch, as included in a namespace with remappings.
 
         Args:
-            given: Values of arguments, by name.
+            values: Values of arguments, by name.
             namespace: Namespace of the file; None for the root namespace.
             remappings: Pairs of old and new name.
         """
-        arguments = "".join(f"<arg name={quoteattr(name)} value={quoteattr(given[name])}/>" for name in given)
+        arguments = "".join(f"<arg name={quoteattr(name)} value={quoteattr(values[name])}/>" for name in values)
         remaps = "".join(f"<remap from={quoteattr(old)} to={quoteattr(new)}/>" for old, new in remappings)
         group = f"<group ns={quoteattr(namespace)}>" if namespace and namespace != "/" else "<group>"
         text = f"<launch>{group}{remaps}<include file={quoteattr(self._path)}>{arguments}</include></group></launch>"

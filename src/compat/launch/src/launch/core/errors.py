@@ -60,20 +60,20 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(sorted(names)) or "none"
 
 
-def require_type(value: object, kind: type, what: str, allowed: str) -> None:
+def require_type(value: object, kind: type, label: str, allowed: str) -> None:
     """Checks the type of an argument.
 
     Args:
         value: The argument.
         kind: Required type.
-        what: Description of the argument for the message.
+        label: Description of the argument for the message.
         allowed: Allowed values, and the action to take.
 
     Raises:
         TypeError: The argument has another type.
     """
     if not isinstance(value, kind):
-        raise TypeError(f"{what} is {value!r}; allowed: {allowed}")
+        raise TypeError(f"{label} is {value!r}; allowed: {allowed}")
 
 
 def line_of_launch_file() -> str:
@@ -102,11 +102,11 @@ def unsupported_names(module: str, alternatives: Mapping[str, str]) -> Callable[
     return raise_if_unsupported
 
 
-def located_error(what: str, error: Exception, where: str) -> LaunchError:
+def located_error(step: str, error: Exception, where: str) -> LaunchError:
     """Returns an error of a launch file's own code, with the line of the code.
 
     Args:
-        what: Description of the failed step.
+        step: Description of the failed step.
         error: Exception of the code.
         where: File and line for an exception that was raised in this package.
     """
@@ -116,6 +116,6 @@ def located_error(what: str, error: Exception, where: str) -> LaunchError:
         if name.partition(".")[0] not in PACKAGES_OF_LAUNCH:
             where = f"{code.co_filename}:{traceback.tb_lineno}"
         traceback = traceback.tb_next
-    found = LaunchError(f"{what}: {type(error).__name__}: {error}")
-    found.where = where
-    return found
+    location = LaunchError(f"{step}: {type(error).__name__}: {error}")
+    location.where = where
+    return location

@@ -122,8 +122,8 @@ def _checked(name: str, value: object, owner: str) -> ParameterValue:
             return [_checked(name, each, owner) for each in value]
         case Mapping():
             return {str(key): _checked(f"{name}/{key}", each, owner) for key, each in value.items()}
-    found = "no value" if value is None else f"{value!r} of type {type(value).__name__}"
-    raise LaunchError(f"{owner}: parameter {name}: got {found}; allowed: {ALLOWED}; correct or remove it")
+    description = "no value" if value is None else f"{value!r} of type {type(value).__name__}"
+    raise LaunchError(f"{owner}: parameter {name}: got {description}; allowed: {ALLOWED}; correct or remove it")
 
 
 def _short(value: ParameterValue) -> str:

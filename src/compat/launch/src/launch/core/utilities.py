@@ -48,13 +48,13 @@ def perform_text(context: LaunchContext, value: SomeSubstitutionsType) -> str:
     return perform_substitutions(context, normalize_to_list_of_substitutions(value))
 
 
-def perform_boolean(context: LaunchContext, value: bool | SomeSubstitutionsType, what: str) -> bool:
+def perform_boolean(context: LaunchContext, value: bool | SomeSubstitutionsType, label: str) -> bool:
     """Returns the bool of a value with substitutions.
 
     Args:
         context: Launch context.
         value: A bool, or a text that is true or false.
-        what: Name of the value for the message.
+        label: Name of the value for the message.
 
     Raises:
         LaunchError: The text is neither true nor false.
@@ -66,16 +66,16 @@ def perform_boolean(context: LaunchContext, value: bool | SomeSubstitutionsType,
         return True
     if text in FALSE_TEXTS:
         return False
-    raise LaunchError(f"{what} is '{text}'; allowed: {', '.join((*TRUE_TEXTS, *FALSE_TEXTS))}; correct it")
+    raise LaunchError(f"{label} is '{text}'; allowed: {', '.join((*TRUE_TEXTS, *FALSE_TEXTS))}; correct it")
 
 
-def perform_number(context: LaunchContext, value: float | SomeSubstitutionsType, what: str) -> float:
+def perform_number(context: LaunchContext, value: float | SomeSubstitutionsType, label: str) -> float:
     """Returns the number of a value with substitutions.
 
     Args:
         context: Launch context.
         value: A number, or a text with a number.
-        what: Name of the value for the message.
+        label: Name of the value for the message.
 
     Raises:
         LaunchError: The text is not a number.
@@ -86,7 +86,7 @@ def perform_number(context: LaunchContext, value: float | SomeSubstitutionsType,
     try:
         return float(text)
     except ValueError:
-        raise LaunchError(f"{what} is '{text}'; allowed: a number; correct it") from None
+        raise LaunchError(f"{label} is '{text}'; allowed: a number; correct it") from None
 
 
 def normalize_to_list_of_entities(entities: SomeEntitiesType | None) -> list[LaunchDescriptionEntity]:
