@@ -303,7 +303,7 @@ def test_several_experiments_need_a_name_and_a_wrong_name_gets_the_right_ones(
     for name in ("first", "second"):
         ReportedExperiment(trials=2, name=name, with_files=False).store(path)
     assert main([str(path)]) == 2
-    assert "first, second; name one with --experiment" in capsys.readouterr().err
+    assert "first, second; name an experiment with --experiment" in capsys.readouterr().err
     assert main([str(path), "--experiment", "secnd"]) == 2
     assert "second" in capsys.readouterr().err
     assert main([str(path), "--experiment", "second", "--into", str(tmp_path / "page.html")]) == 0

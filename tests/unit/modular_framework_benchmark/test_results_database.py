@@ -260,7 +260,7 @@ def test_one_database_holds_several_experiments(path: Path) -> None:
         ),
         ({"metrics": (Metric("a b", "task", MetricKind.TIME, Direction.LOWER),)}, "metric 'a b' is not an identifier"),
         ({"metrics": (Metric("success", "task", MetricKind.TIME, Direction.LOWER),)}, "`success` is a rate"),
-        ({"compared": "planner"}, "compared factor 'planner': allowed are grasp_method, object, speed"),
+        ({"compared": "planner"}, "compared factor 'planner': allowed: grasp_method, object, speed"),
         (
             {"factors": (Factor("grasp_method", METHODS), Factor("Status", ("1",)))},
             "factor 'status': the name is taken",

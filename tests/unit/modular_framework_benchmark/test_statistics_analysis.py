@@ -333,7 +333,7 @@ def test_a_partner_that_is_not_finished_is_told() -> None:
     (found,) = compare(shorter)
     assert found.counts.pairs == 3
     assert "1 episode without a partner" in found.notes
-    assert found.notes[-1] == "unfinished: 7 of 10 episodes; nothing is claimed before the last one"
+    assert found.notes[-1] == "unfinished: 7 of 10 episodes; nothing is claimed before the last episode"
 
 
 def test_a_fixed_experiment_claims_nothing_before_its_last_episode() -> None:
@@ -483,5 +483,5 @@ def test_an_episode_that_is_there_twice_and_an_unknown_factor_are_refused() -> N
     description = dataclasses.replace(results.description, compared="planner")
     with pytest.raises(ValueError, match="has no factor 'planner'; its factors are: method"):
         compare(dataclasses.replace(results, description=description))
-    with pytest.raises(ValueError, match="'method' is not a factor beside the compared one; these factors are: none"):
+    with pytest.raises(ValueError, match="'method' is not a factor besides the compared factor; allowed: none"):
         summarise_by_level(results, "method")

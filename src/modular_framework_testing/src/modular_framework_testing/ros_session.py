@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A separate ROS master and its launches, so that tests run beside each other and beside a user's master."""
+"""A separate ROS master and its launches, so that tests run in parallel and beside a user's master."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class ExperimentSession:
     def __init__(
         self, database: ResultDatabase, number: int, run: str, options: SessionOptions, settings: RunSettings
     ) -> None:
-        (self._stored,) = (one for one in database.experiments() if one.id == number)
+        (self._stored,) = (stored for stored in database.experiments() if stored.id == number)
         self._database, self._number, self._run_mark, self._options = database, number, run, options
         description = self._stored.description
         self._settings = settings

@@ -78,7 +78,7 @@ def _export_lerobot(database: ResultDatabase, number: int, arguments: argparse.N
         print(f"  episode {episode}: {reason}", file=sys.stderr)
 
 
-def _chosen_levels(given: Sequence[str], description: ExperimentDescription) -> Mapping[str, str]:
+def _chosen_levels(texts: Sequence[str], description: ExperimentDescription) -> Mapping[str, str]:
     """Returns the requested levels, keyed by factor.
 
     Raises:
@@ -86,10 +86,12 @@ def _chosen_levels(given: Sequence[str], description: ExperimentDescription) -> 
     """
     allowed = {factor.name: factor.levels for factor in description.factors}
     levels = {}
-    for text in given:
+    for text in texts:
         name, _, level = text.partition("=")
         if level not in allowed.get(name, ()):
-            levels_text = "; ".join(f"{factor}={' or '.join(found)}" for factor, found in allowed.items())
+            levels_text = "; ".join(
+                f"{factor}={' or '.join(factor_levels)}" for factor, factor_levels in allowed.items()
+            )
             raise ExportError(f"--where {text}: the experiment has no such level; allowed: {levels_text}")
         levels[name] = level
     return levels

@@ -82,13 +82,13 @@ def _prune(arguments: argparse.Namespace) -> int:
 
 def _paths(episodes: pd.DataFrame, root: Path, kinds: Sequence[str]) -> list[Path]:
     """Returns the paths to delete, restricted to the folder of the database."""
-    found = []
+    paths = []
     for text in episodes["folder"]:
         folder = (root / str(text)).resolve()
         if root not in folder.parents or not folder.is_dir():
             continue
         if EVERYTHING in kinds:
-            found.append(folder)
+            paths.append(folder)
         else:
-            found += [folder / name for kind in kinds for name in KINDS[kind] if (folder / name).exists()]
-    return found
+            paths += [folder / name for kind in kinds for name in KINDS[kind] if (folder / name).exists()]
+    return paths

@@ -30,7 +30,7 @@ def run_reporting(
 
     Args:
         parser: Parser whose `prog` is the command's name.
-        arguments: Command-line arguments; None for those of the process.
+        arguments: Command-line arguments; None for the arguments of the process.
         execute: Function that executes the command and returns the exit code.
     """
     given = parser.parse_args(arguments)

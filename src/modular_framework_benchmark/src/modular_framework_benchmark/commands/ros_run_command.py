@@ -58,7 +58,7 @@ def resume(arguments: Sequence[str]) -> int:
     """Runs the command `resume`."""
     parser = argparse.ArgumentParser(prog="resume", description="Continues an interrupted experiment.")
     parser.add_argument("database", help="SQLite file or SQLAlchemy URL with its results")
-    parser.add_argument("--experiment", help="name of the experiment; default: the only unfinished one")
+    parser.add_argument("--experiment", help="name of the experiment; default: the only unfinished experiment")
     _add_run_options(parser)
     return _guarded(_resume, parser.parse_args(arguments))
 
@@ -147,7 +147,7 @@ def _session(
 ) -> ExperimentSession:
     if lock.ended_processes:
         print(f"ended {lock.ended_processes} processes of an earlier run", file=sys.stderr)
-    (description,) = (one.description for one in database.experiments() if one.id == number)
+    (description,) = (stored.description for stored in database.experiments() if stored.id == number)
     settings = settings_of(experiment, description)
     return ExperimentSession(database, number, lock.run, options, settings)
 
@@ -157,15 +157,17 @@ def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
     if name is not None:
         return database.find(name)
     stored = database.experiments()
-    unfinished = [one for one in stored if one.finished < one.planned]
+    unfinished = [experiment for experiment in stored if experiment.finished < experiment.planned]
     if len(unfinished) == 1:
         return unfinished[0].id
     if len(stored) == 1:
         return stored[0].id
-    names = ", ".join(one.description.name for one in unfinished or stored)
+    names = ", ".join(experiment.description.name for experiment in unfinished or stored)
     count = f"{len(unfinished)} unfinished experiments" if unfinished else "no unfinished experiment"
     shown = shown_target(target)
-    raise CommandError(f"{shown} has {count}; name one with --experiment; allowed: {names or 'none, it is empty'}")
+    raise CommandError(
+        f"{shown} has {count}; name an experiment with --experiment; allowed: {names or 'none, it is empty'}"
+    )
 
 
 def experiment_path(given: Path) -> Path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Renders a video of an episode from its recording after the episode has ended, which costs the episode no time.
+"""Renders a video of an episode from its recording after the episode has ended, so that the episode takes no longer.
 
     python3 -m modular_framework_benchmark.episodes.episode_video EPISODE_FOLDER
 

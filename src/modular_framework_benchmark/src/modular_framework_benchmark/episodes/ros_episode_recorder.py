@@ -154,9 +154,9 @@ class EpisodeRecorder:
         return answer
 
     @contextlib.contextmanager
-    def _bag(self, folder: Path, wanted: bool) -> Iterator[None]:
+    def _bag(self, folder: Path, is_requested: bool) -> Iterator[None]:
         """Records a bag within the context, which starts once rosbag has subscribed to the topics."""
-        if not wanted:
+        if not is_requested:
             yield
             return
         with contextlib.closing(BagRecording(folder)) as bag:
@@ -257,9 +257,9 @@ class EpisodeRecorder:
 
     def _wait_for_stack(self, request: EpisodeRequest) -> None:
         """Waits until the task can start: task node, simulation, controllers and method are available."""
-        wanted = {START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])}
-        wanted |= {LIST_CONTROLLERS} if request.controllers else set()
-        self._wait(lambda: wanted <= _services())
+        services = {START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])}
+        services |= {LIST_CONTROLLERS} if request.controllers else set()
+        self._wait(lambda: services <= _services())
         self._wait(lambda: set(request.controllers) <= _running_controllers().keys())
         if request.method_nodes:
             self._wait(lambda: bool(_publishers(GENERATION_SIGNAL)))

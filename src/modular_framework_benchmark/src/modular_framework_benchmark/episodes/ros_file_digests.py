@@ -77,9 +77,9 @@ def robot_digests(urdf: str, srdf: str, folder: Path | None = None) -> Mapping[s
         folder: Folder of the meshes of packages that do not exist; None for no such meshes.
     """
     texts = {"robot description": urdf, "semantic description": srdf}
-    found = {what: hashlib.sha256(text.encode()).hexdigest() for what, text in texts.items() if text}
+    digests = {description: hashlib.sha256(text.encode()).hexdigest() for description, text in texts.items() if text}
     meshes = joint_digest(robot_files(urdf, folder))
-    return found | ({"robot meshes": meshes} if meshes else {})
+    return digests | ({"robot meshes": meshes} if meshes else {})
 
 
 @functools.lru_cache(maxsize=64)
@@ -91,9 +91,9 @@ def robot_files(urdf: str, folder: Path | None = None) -> tuple[Path, ...]:
         folder: Folder of the meshes of packages that do not exist; None for no such meshes.
     """
     resources = model_resources("")
-    found = files_in_description(urdf, resources) if urdf else ()
+    installed = files_in_description(urdf, resources) if urdf else ()
     if folder is None:
-        return found
+        return installed
     finders: tuple[PackageFinder, ...] = (lambda name: str(folder / name), lambda _: str(folder))
     beside = (files_in_description(urdf, Resources(find_package=find)) for find in finders)
-    return tuple(dict.fromkeys([*found, *(path for paths in beside for path in paths)]))
+    return tuple(dict.fromkeys([*installed, *(path for paths in beside for path in paths)]))

@@ -33,11 +33,11 @@ def package_source(package: str) -> tuple[str, str]:
 def _module_folders(name: str) -> list[Path]:
     """Returns the folders of a Python module, which an install space keeps outside the ROS package's folder."""
     try:
-        found = importlib.util.find_spec(name)
+        spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):
         return []
     # Modules in the devel space only forward to the sources.
-    return [Path(path) for path in (found.submodule_search_locations or ()) if "devel" not in path] if found else []
+    return [Path(path) for path in (spec.submodule_search_locations or ()) if "devel" not in path] if spec else []
 
 
 def tree_digest(folders: list[Path]) -> str:

@@ -140,7 +140,7 @@ def _tracking(samples: Samples, origin_s: float) -> pd.DataFrame:
 
 
 def periodic_joint_states(messages: Sequence[Any], rate_hz: float) -> list[Any]:
-    """Returns the joint states at a fixed rate, without those published while time was held.
+    """Returns the joint states at a fixed rate, without states published while time was held.
 
     A simulation also publishes its state while time is held. Whether time is held between two requests to advance
     depends on the load of the machine, so these states would differ from run to run.
@@ -199,9 +199,9 @@ def _trajectory(joints: Sequence[Any], commands: pd.DataFrame, origin_s: float) 
     frame = pd.DataFrame.from_dict(rows, orient="index").sort_index()
     frame.insert(0, "time_s", frame.index.to_numpy(dtype=float))
     frame = frame.reset_index(drop=True)
-    for joint, wanted in commands.sort_values("time_s").groupby("joint"):
-        last = np.searchsorted(wanted["time_s"].to_numpy(), frame["time_s"].to_numpy(), side="right") - 1
-        values = wanted["desired"].to_numpy()
+    for joint, joint_commands in commands.sort_values("time_s").groupby("joint"):
+        last = np.searchsorted(joint_commands["time_s"].to_numpy(), frame["time_s"].to_numpy(), side="right") - 1
+        values = joint_commands["desired"].to_numpy()
         frame[f"{joint}/command"] = np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
     return frame
 
@@ -212,9 +212,9 @@ def _with_objects(trajectory: pd.DataFrame, poses: dict[str, pd.DataFrame]) -> p
     for name, rows in poses.items():
         if len(rows) < 2 or not len(trajectory):
             continue
-        found = np.searchsorted(rows["time_s"].to_numpy(), trajectory["time_s"].to_numpy(), side="right") - 1
+        indices = np.searchsorted(rows["time_s"].to_numpy(), trajectory["time_s"].to_numpy(), side="right") - 1
         for column in POSE_COLUMNS:
-            columns[f"{name}/{column}"] = rows[column].to_numpy()[np.maximum(found, 0)]
+            columns[f"{name}/{column}"] = rows[column].to_numpy()[np.maximum(indices, 0)]
     return pd.concat([trajectory, pd.DataFrame(columns, index=trajectory.index)], axis=1)
 
 
@@ -259,7 +259,7 @@ def _planning(samples: Samples, origin_s: float) -> list[dict[str, Any]]:
 
 
 def _is_plan(report: dict[str, Any]) -> bool:
-    """Returns whether a report is that of a plan; a feasible place is only the start of the plans to it."""
+    """Returns whether a report concerns a plan; a feasible place is only the start of the plans to it."""
     kind = report["kind"]
     return kind in ("plan", "cartesian_path", "sequence") or (kind == "place" and report["error_code"] != 1)
 

@@ -88,7 +88,7 @@ class Samples:
             return self._goals.keys() == self._results.keys()
 
     def latest_s(self) -> float:
-        """Returns the stamp of the latest joint state [s]; minus infinity before the first one."""
+        """Returns the stamp of the latest joint state [s]; minus infinity before the first message."""
         return float(self.joints[-1].header.stamp.to_sec()) if self.joints else -math.inf
 
     def connect(self) -> None:

@@ -50,11 +50,11 @@ def shake(samples: Samples, duration_s: float) -> float:
         JointTrajectoryPoint(positions=point, velocities=speed, time_from_start=rospy.Duration.from_sec(time_s))
         for time_s, point, speed in zip(times.tolist(), points.tolist(), speeds.tolist(), strict=True)
     ]
-    begun = rospy.get_time()
+    started_s = rospy.get_time()
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
     if wait_for_result(client, ACTION_TIMEOUT_S + duration_s / MIN_REAL_TIME_FACTOR) != GoalStatus.SUCCEEDED:
         raise ShakeError(f"controller '{controller}' did not shake the arm: {client.get_goal_status_text()}")
-    return begun
+    return started_s
 
 
 def _arm(samples: Samples) -> tuple[str, list[str], Any]:

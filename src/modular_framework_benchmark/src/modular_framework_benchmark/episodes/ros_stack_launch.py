@@ -51,9 +51,9 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
         arguments |= {**settings.arguments, **({"task_constructor_script": settings.task} if settings.task else {})}
         arguments |= {name: value for name, value in FIXED_ARGUMENTS.items() if name in known}
-        given = [f"{name}:={value}" for name, value in arguments.items()]
-        check_arguments(path, given, file_faults)
-        values = argument_values(path, given)
+        argument_texts = [f"{name}:={value}" for name, value in arguments.items()]
+        check_arguments(path, argument_texts, file_faults)
+        values = argument_values(path, argument_texts)
         controllers: tuple[str, ...] = ()
         method_nodes = _nodes_of(values.get(METHOD, ""))
         if values.get("robot_package") and values.get("controller_file"):

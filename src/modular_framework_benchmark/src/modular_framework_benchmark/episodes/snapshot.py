@@ -30,19 +30,19 @@ RUN_MARK = "MODULAR_FRAMEWORK_RUN"
 @functools.cache
 def versions() -> dict[str, Any]:
     """Returns the git revision of this software and the versions of its environment, constant within a process."""
-    found = {}
+    package_versions = {}
     for name in PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            package_versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = ""
+            package_versions[name] = ""
     return {
         "version": _git("describe", "--always", "--dirty", "--tags"),
         "git_revision": _git("rev-parse", "HEAD"),
         "git_changed": bool(_git("status", "--porcelain", "--untracked-files=no")),
         "python": platform.python_version(),
         "ros_distribution": os.environ.get("ROS_DISTRO", ""),
-        "packages": found,
+        "packages": package_versions,
         "ros_packages": {name: _ros_version(name) for name in ROS_PACKAGES},
         "environment": _environment_digest(),
     }
@@ -57,8 +57,8 @@ def _ros_version(package: str) -> str:
 
 def _environment_digest() -> str:
     """Returns the SHA-256 of names and versions of all Python packages of this environment, hexadecimal."""
-    found = sorted({f"{package.name}=={package.version}" for package in metadata.distributions()})
-    return hashlib.sha256("\n".join(found).encode()).hexdigest()
+    package_versions = sorted({f"{package.name}=={package.version}" for package in metadata.distributions()})
+    return hashlib.sha256("\n".join(package_versions).encode()).hexdigest()
 
 
 def _git(*arguments: str) -> str:
@@ -142,7 +142,7 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def _others_s() -> dict[int, float]:
-    excluded, found = {os.getpid(), os.getppid()}, {}
+    excluded, times_s = {os.getpid(), os.getppid()}, {}
     run = f"{RUN_MARK}={os.environ.get(RUN_MARK, '').partition('/')[0]}".encode()
     for folder in Path("/proc").iterdir():
         try:
@@ -150,10 +150,10 @@ def _others_s() -> dict[int, float]:
                 continue
             # The name in parentheses may contain spaces.
             fields = (folder / "stat").read_text(errors="replace").rpartition(")")[2].split()
-            found[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS
+            times_s[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS
         except OSError:  # the process has ended
             continue
-    return found
+    return times_s
 
 
 def _is_of_run(process: Path, run: bytes) -> bool:

@@ -38,7 +38,7 @@ class StackLaunch:
         package: Package of the launch file.
         launch_file: Name of the launch file.
         arguments: Launch arguments.
-        parameters: ROS parameters that override those of the launch files, keyed by absolute name.
+        parameters: ROS parameters that override parameters of the launch files, keyed by absolute name.
         method_nodes: Absolute names of the grasp generation method's nodes; empty without a method.
         controllers: Names of the controllers to start.
         can_restart: Whether the world can be reset to its state after a cold start.

@@ -18,7 +18,7 @@ class KinematicsSettings(ModelSettings):
 
     Attributes:
         group: Planning group.
-        solver: Solver; "" for that of the robot's configuration.
+        solver: Solver; "" for the solver in the robot's configuration.
         poses: Number of poses.
         timeout: Time budget of a pose [s].
         parameters: ROS parameters of the solver, keyed by full name.

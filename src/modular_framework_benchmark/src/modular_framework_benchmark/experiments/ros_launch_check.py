@@ -52,7 +52,7 @@ class LaunchCheck:
         launch: Preview of the launch file.
         given: Overriding parameters, keyed by full name.
         extra: Names of overriding parameters that the user's own nodes read.
-        regions: Names of regions that episodes set besides those of the launch.
+        regions: Names of regions that episodes add to the regions of the launch.
     """
 
     def __init__(
@@ -104,8 +104,8 @@ class LaunchCheck:
         registry = self.registry()
         assert registry is not None and self._node is not None
         parent = f"{self._node.name}/{PIPELINES}/"
-        given = [name.removeprefix(parent).split("/")[0] for name in leaves(self._given) if name.startswith(parent)]
-        broken = registry.adapter_faults([registry.default, *given])
+        pipelines = [name.removeprefix(parent).split("/")[0] for name in leaves(self._given) if name.startswith(parent)]
+        broken = registry.adapter_faults([registry.default, *pipelines])
         yield from (LaunchFault(f"{parent}{name}", text) for name, text in broken.items())
         for name, value in self._names.naming("pipeline"):
             if value not in registry.specs:
@@ -113,20 +113,20 @@ class LaunchCheck:
         group = str(self.launch.parameters.get("/arm_group_name", ""))
         for name, value in self._names.naming("planner"):
             try:
-                found = registry.resolve(value, group)
+                planner = registry.resolve(value, group)
             except UnknownNameError as error:
                 yield unknown_name(name, error.what, error.name, error.known)
                 continue
             except ModelError:
                 continue  # adapter_faults reported it
-            for parameter, text in registry.adapter_faults([found.pipeline]).items():
+            for parameter, text in registry.adapter_faults([planner.pipeline]).items():
                 if parameter not in broken:
                     yield LaunchFault(name, text)
-            for text in registry.faults(found):
+            for text in registry.faults(planner):
                 yield LaunchFault(name, f"planner '{value}': {text.replace('; it is ignored', '')}")
-        there = {name for name in registry.specs if f"{parent}{name}/planning_plugin" in self.launch.parameters}
+        configured = {name for name in registry.specs if f"{parent}{name}/planning_plugin" in self.launch.parameters}
         names = PipelineNames(
-            parent, (*self._pipelines, *sorted(there - {*self._pipelines})), self._robot.groups, registry
+            parent, (*self._pipelines, *sorted(configured - {*self._pipelines})), self._robot.groups, registry
         )
         settings = leaves(self._given)
         for name, value in settings.items():
@@ -157,9 +157,9 @@ class LaunchCheck:
         """Yields unknown groups, solvers and keys of kinematics.yaml."""
         groups = self._robot.groups
         for name, value in self.launch.parameters.items():
-            _, found, rest = name.partition(f"/{DESCRIPTION}_kinematics/")
-            group, _, key = rest.partition("/")
-            if not found:
+            _, parent, path = name.partition(f"/{DESCRIPTION}_kinematics/")
+            group, _, key = path.partition("/")
+            if not parent:
                 continue
             if groups and group not in groups:
                 yield unknown_name(name, "planning group", group, groups)
@@ -174,8 +174,8 @@ class LaunchCheck:
         if self._node is None:
             return parameters
         named = (DETECTOR, MANAGER)
-        rest = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
-        return rest | resolved_names(self.launch, self._node)
+        unnamed = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
+        return unnamed | resolved_names(self.launch, self._node)
 
     def kinematics(self) -> dict[str, Any]:
         """Returns the contents of kinematics.yaml; empty without a move_group node."""
@@ -193,37 +193,39 @@ class LaunchCheck:
         """Yields the faults of the task, its states and templates, or of the state machine to load."""
         for node in self.launch.nodes:
             if node.executable == RUN_TASK:
-                own = self.launch.below(node.name)
-                machine = str(own.get("state_machine_to_load", "")).strip()
-                yield from self._machine_faults(machine) if machine else self._script_faults(own)
-                yield from self._named_state_faults(str(own.get("config_directory", "")))
+                parameters = self.launch.below(node.name)
+                machine = str(parameters.get("state_machine_to_load", "")).strip()
+                yield from self._machine_faults(machine) if machine else self._script_faults(parameters)
+                yield from self._named_state_faults(str(parameters.get("config_directory", "")))
 
     def _machine_faults(self, machine: str) -> Iterator[LaunchFault]:
         folder, name = generator.default_output_directory(), "state_machine_to_load"
         if not (Path(machine).is_file() or (folder / machine).is_file()):
-            there = sorted(path.name for path in folder.glob("*.py"))
-            text = f"argument '{name}': there is no file {machine}, nor in {folder}; {listing(there, 'it is empty')}"
-            yield LaunchFault(name, f"{text}{nearest(machine, there)}", ARGUMENTS)
+            machines = sorted(path.name for path in folder.glob("*.py"))
+            text = f"argument '{name}': there is no file {machine}, nor in {folder}; {listing(machines, 'it is empty')}"
+            yield LaunchFault(name, f"{text}{nearest(machine, machines)}", ARGUMENTS)
 
     def _named_state_faults(self, config: str) -> Iterator[LaunchFault]:
         """Yields unknown joints and joint states in the files of named states and trajectories."""
         joints = self._robot.movable_joints
         try:
-            found = list(named_joint_faults(Path(config), joints)) if config and joints else []
+            faults = list(named_joint_faults(Path(config), joints)) if config and joints else []
         except ValueError as error:
-            found = [str(error)]
-        yield from (LaunchFault(CONFIGURATION, text, ARGUMENTS) for text in found)
+            faults = [str(error)]
+        yield from (LaunchFault(CONFIGURATION, text, ARGUMENTS) for text in faults)
 
-    def _script_faults(self, own: Mapping[str, Any]) -> Iterator[LaunchFault]:
-        script = str(own.get("task_constructor_script", ""))
-        folders = [pipeline.directories_from(str(own.get(f"{kind}_directory", ""))) for kind in ("states", "templates")]
-        for kind, given in zip(("states", "templates"), folders, strict=True):
-            for folder in given:
+    def _script_faults(self, parameters: Mapping[str, Any]) -> Iterator[LaunchFault]:
+        script = str(parameters.get("task_constructor_script", ""))
+        folders = [
+            pipeline.directories_from(str(parameters.get(f"{kind}_directory", ""))) for kind in ("states", "templates")
+        ]
+        for kind, kind_folders in zip(("states", "templates"), folders, strict=True):
+            for folder in kind_folders:
                 if not folder.is_dir():
                     name = f"{kind}_directory"
                     yield LaunchFault(name, f"argument '{name}': there is no folder {folder}", ARGUMENTS)
                     return
-        names = self._known_names(str(own.get("config_directory", "")))
+        names = self._known_names(str(parameters.get("config_directory", "")))
         checked = checked_task(script, tuple(folders[0]), tuple(folders[1]), CacheableNames(names))
         yield from checked.faults
         yield from self._task_planner_faults(checked.planners)

@@ -50,23 +50,23 @@ class PipelineNames:
         if not name.startswith(self.parent):
             return
         declared = existing_declaration(PACKAGE, "planning_pipeline").parameters
-        pipeline, key, *rest = [*name.removeprefix(self.parent).split("/"), ""]
+        pipeline, key, *settings = [*name.removeprefix(self.parent).split("/"), ""]
         known = (*declared, *self.groups)
         if pipeline not in self.pipelines:
             yield unknown_name(name, "pipeline", pipeline, self.pipelines)
         elif key not in known:
             text = f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known)}{nearest(key, known)}"
             yield LaunchFault(name, text)
-        elif key == "planner_configs" and len(rest) > 2:
-            yield from self._setting_faults(name, value, pipeline, rest)
-        elif (key in self.groups and rest[0] in PLANNER_KEYS) or key == PLANNER_KEYS[0]:
+        elif key == "planner_configs" and len(settings) > 2:
+            yield from self._setting_faults(name, value, pipeline, settings)
+        elif (key in self.groups and settings[0] in PLANNER_KEYS) or key == PLANNER_KEYS[0]:
             yield from self._planner_faults(name, value, pipeline, key if key in self.groups else "")
-        elif key in declared and declared[key].below and rest[0]:
+        elif key in declared and declared[key].below and settings[0]:
             below = existing_declaration(*declared[key].below.split("/"))
-            text = tree_fault("/".join(rest).rstrip("/"), value, below, {})
+            text = tree_fault("/".join(settings).rstrip("/"), value, below, {})
             if text:
                 yield LaunchFault(name, f"parameter '{name}' {text}")
-        elif key in declared and not rest[1:] and declared[key].fault(value):
+        elif key in declared and not settings[1:] and declared[key].fault(value):
             yield LaunchFault(name, f"parameter '{name}' {declared[key].fault(value)}")
 
     def misspelt(self, name: str) -> Iterator[LaunchFault]:
@@ -88,13 +88,13 @@ class PipelineNames:
             except UnknownNameError as error:
                 yield unknown_name(name, error.what, error.name, error.known)
 
-    def _setting_faults(self, name: str, value: Any, pipeline: str, rest: list[str]) -> Iterator[LaunchFault]:
+    def _setting_faults(self, name: str, value: Any, pipeline: str, setting: list[str]) -> Iterator[LaunchFault]:
         try:
-            found = self.registry.resolve(rest[0], "", pipeline)
+            planner = self.registry.resolve(setting[0], "", pipeline)
         except UnknownNameError as error:
             yield unknown_name(name, error.what, error.name, error.known)
             return
-        for text in self.registry.faults(found, {rest[1]: value}):
+        for text in self.registry.faults(planner, {setting[1]: value}):
             yield LaunchFault(name, text.replace("; it is ignored", ""))
 
 
@@ -156,8 +156,8 @@ def resolved_names(launch: LaunchPreview, node: LaunchedNode) -> dict[str, str]:
         launch: Launch without faults.
         node: Node move_group of the launch.
     """
-    places = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
-    detector = next((launch.parameters[place] for place in places if place in launch.parameters), "")
+    names = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
+    detector = next((launch.parameters[name] for name in names if name in launch.parameters), "")
     kind: Any = collision_detector(str(detector))
     manager = str(launch.parameters.get(f"{node.name}/{MANAGER}") or SIMPLE_MANAGER)
     return {DETECTOR: f"{kind.__module__}/{kind.__qualname__}", MANAGER: manager.replace("::", "/")}

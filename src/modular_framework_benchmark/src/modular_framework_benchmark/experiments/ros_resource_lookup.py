@@ -56,7 +56,7 @@ class RosResourceLookup:
         folder = self.package(package) / "launch"
         if (folder / file).is_file():
             return folder / file
-        files = sorted(found.name for found in folder.glob("*.launch"))
+        files = sorted(path.name for path in folder.glob("*.launch"))
         raise UnresolvedReference(
             f"package {package} has no launch file '{file}'; {listing(files, 'it has none')}{nearest(file, files)}"
         )
@@ -72,15 +72,15 @@ class RosResourceLookup:
 
     def task(self, name: str, folder: Path) -> str:
         """Returns the path of a task of the API package or of the user."""
-        own = (folder / Path(name).expanduser()).resolve()
-        if own.is_file():
-            return str(own)
+        path = (folder / Path(name).expanduser()).resolve()
+        if path.is_file():
+            return str(path)
         scripts = self.package(API_PACKAGE) / SCRIPTS_FOLDER
         if name == Path(name).name and (scripts / name).is_file():
             return str(scripts / name)
-        there = sorted(found.name for found in scripts.glob("*.yaml"))
+        tasks = sorted(script.name for script in scripts.glob("*.yaml"))
         raise UnresolvedReference(
-            f"there is no task '{name}'; {listing(there)}, or the path of a file{nearest(name, there)}"
+            f"there is no task '{name}'; {listing(tasks)}, or the path of a file{nearest(name, tasks)}"
         )
 
     def model(self, name: str, launch: str, arguments: Mapping[str, str], folder: Path) -> Path:
@@ -93,15 +93,15 @@ class RosResourceLookup:
             folder: Base of relative paths.
         """
         if "/" in name or name.endswith(".sdf"):
-            own = (folder / Path(name).expanduser()).resolve()
-            if own.is_file():
-                return own
-            raise UnresolvedReference(f"there is no model file {own}; give the path of an .sdf file")
+            path = (folder / Path(name).expanduser()).resolve()
+            if path.is_file():
+                return path
+            raise UnresolvedReference(f"there is no model file {path}; give the path of an .sdf file")
         models = self._description(launch, arguments) / "models"
         if (models / name / "model.sdf").is_file():
             return models / name / "model.sdf"
-        there = sorted(found.parent.name for found in models.glob("*/model.sdf"))
-        raise UnresolvedReference(f"there is no model '{name}'; {listing(there)}{nearest(name, there)}")
+        model_names = sorted(file.parent.name for file in models.glob("*/model.sdf"))
+        raise UnresolvedReference(f"there is no model '{name}'; {listing(model_names)}{nearest(name, model_names)}")
 
     def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
         """Returns the names of the models in the world of a launch."""

@@ -47,8 +47,8 @@ def robot_names(urdf: str, srdf: str) -> RobotNames:
             groups = tuple(semantics.groups)
             for joint in semantics.virtual_joints:
                 if joint.kind in (PLANAR, FLOATING):
-                    own = MultiDofJoint(joint.name, joint.kind, joint.parent_frame, joint.child_link)
-                    variables += (*own.variables, *joint.variables)
+                    multi_dof = MultiDofJoint(joint.name, joint.kind, joint.parent_frame, joint.child_link)
+                    variables += (*multi_dof.variables, *joint.variables)
     except XmlError:
         pass  # reported by the check of the task
     try:

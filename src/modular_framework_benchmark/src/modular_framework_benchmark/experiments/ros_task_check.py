@@ -34,7 +34,7 @@ class CacheableNames:
     def __init__(self, names: KnownNames) -> None:
         self.names = names
         kinds = {**names.names, PLANNER: names.planners() or ()}
-        self._content = repr(sorted((kind, sorted(found)) for kind, found in kinds.items()))
+        self._content = repr(sorted((kind, sorted(known)) for kind, known in kinds.items()))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, CacheableNames) and self._content == other._content

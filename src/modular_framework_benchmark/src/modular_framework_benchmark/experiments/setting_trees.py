@@ -18,9 +18,9 @@ def references(node: Node) -> Iterator[tuple[str, Scalar]]:
     """Yields each `$NAME` in the texts of a value, with its text."""
     match node:
         case Scalar(value=str(text)):
-            for found in _REFERENCE.findall(text):
-                if found != "$":
-                    yield found, node
+            for name in _REFERENCE.findall(text):
+                if name != "$":
+                    yield name, node
         case Scalar():
             return
         case Sequence():
@@ -59,10 +59,10 @@ def substituted(node: Node, levels: Map[str, Scalar]) -> Node:
     """
     match node:
         case Scalar(value=str(text)):
-            whole = text[1:]
-            if text.startswith("$") and whole in levels:
-                return Scalar(levels[whole].value, node.location)
-            return Scalar(_REFERENCE.sub(lambda found: _text_of(found[1], levels), text), node.location)
+            name = text[1:]
+            if text.startswith("$") and name in levels:
+                return Scalar(levels[name].value, node.location)
+            return Scalar(_REFERENCE.sub(lambda reference: _text_of(reference[1], levels), text), node.location)
         case Scalar():
             return node
         case Sequence():
@@ -104,12 +104,12 @@ def leaves(node: Mapping, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
 
 def location_below(node: Mapping, keys: tuple[str, ...]) -> SourceLocation:
     """Returns the location of the value that the keys lead to, or of the innermost value above it."""
-    found: Node = node
+    value: Node = node
     for key in keys:
-        if not isinstance(found, Mapping):
+        if not isinstance(value, Mapping):
             break
-        name = key if key in found.entries else next((name for name in found.entries if key.startswith(f"{name}/")), "")
+        name = key if key in value.entries else next((name for name in value.entries if key.startswith(f"{name}/")), "")
         if not name:
             break
-        found = found.entries[name]
-    return found.location
+        value = value.entries[name]
+    return value.location

@@ -55,15 +55,15 @@ def greatest_tracking_error(episode: EpisodeMeasurements) -> float | None:
 
 def _over_motions(episode: EpisodeMeasurements, figure: Callable[[Array, Array], float | None]) -> list[float | None]:
     """Returns a figure of the measured times and positions of the joints in each executed motion."""
-    samples, found = episode.joints, []
+    samples, figures = episode.joints, []
     for report in _executions(episode):
         if samples is None or report.motion is None:
             continue
         columns = [samples.joints.index(joint) for joint in report.motion.joints if joint in samples.joints]
         rows = (samples.times_s >= report.started_s) & (samples.times_s <= report.ended_s)
         if rows.any() and columns:
-            found.append(figure(samples.times_s[rows], samples.positions[rows][:, columns]))
-    return found
+            figures.append(figure(samples.times_s[rows], samples.positions[rows][:, columns]))
+    return figures
 
 
 def executed_length(episode: EpisodeMeasurements) -> float | None:

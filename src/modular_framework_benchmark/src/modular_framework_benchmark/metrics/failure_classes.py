@@ -50,8 +50,8 @@ _OF_STATUS = {
 def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> FailureClass | None:
     """Returns the class of an episode; None for a success.
 
-    The class is what ended the attempt: the loss of a held object unless the gripper opened on purpose, otherwise the
-    last failure of a component, otherwise what the world shows.
+    The class names the end of the attempt: the loss of a held object unless the gripper opened on purpose, otherwise
+    the last failure of a component, otherwise the final state of the world.
 
     Args:
         episode: Measurements of the episode.

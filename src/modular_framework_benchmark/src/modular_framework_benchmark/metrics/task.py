@@ -18,7 +18,7 @@ def success(episode: EpisodeMeasurements) -> float | None:
 
 
 def progress(episode: EpisodeMeasurements) -> float | None:
-    """Weight of the milestones that the episode reached in order, as a fraction of all weights; None without any."""
+    """Weight of the milestones reached in order, as a fraction of all weights; None without milestones."""
     return None if episode.progress is None else episode.progress.fraction
 
 
@@ -36,6 +36,6 @@ def task_wall_time(episode: EpisodeMeasurements) -> float | None:
 
 
 def failed_states(episode: EpisodeMeasurements) -> float | None:
-    """Number of failed state executions, including those from which the task recovered."""
+    """Number of failed state executions, including failures from which the task recovered."""
     states = [span for span in episode.states if span.kind == "state"]
     return float(sum(span.failed for span in states)) if states else None

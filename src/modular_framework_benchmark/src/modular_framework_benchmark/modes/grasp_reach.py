@@ -36,7 +36,8 @@ class GraspReach:
     def joint_travel(self, candidate: GraspCandidate) -> float | None:
         """Returns the largest joint movement between successive poses of a grasp [rad or m], or None if unreachable.
 
-        The hand advances with the opening of the grasp. It arrives at the first pose with its opening in the scene.
+        The hand advances with the opening of the grasp. The hand arrives at the first pose with its opening in the
+        scene.
 
         Args:
             candidate: Grasp in the planning frame.
@@ -64,7 +65,7 @@ class GraspReach:
         return travel
 
     def _as_in_scene(self, positions: Array) -> Array:
-        """Returns positions whose joints outside the group have their values of the scene."""
+        """Returns positions in which the joints outside the group have the values of the scene."""
         result = self._scene.positions.copy()
         result[self._solver.group.indices] = positions[self._solver.group.indices]
         return self._model.with_mimics(result)

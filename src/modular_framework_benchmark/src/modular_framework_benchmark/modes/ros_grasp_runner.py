@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs grasp generation methods on scenes with objects, without simulation and without a ROS master.
 
-A method returns ranked candidates. The best candidates are then checked like those of a grasp generator: collision-free
-inverse kinematics at the pregrasp, grasp and postgrasp pose.
+A method returns ranked candidates. The best candidates are then checked as in a grasp generator: collision-free inverse
+kinematics at the pregrasp, grasp and postgrasp pose.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
 
 
 def method_class(reference: str) -> Any:
-    """Returns the class of a method; argument and errors are those of `load_method`."""
+    """Returns the class of a method, with the argument and the errors of `load_method`."""
     module, _, name = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), name)

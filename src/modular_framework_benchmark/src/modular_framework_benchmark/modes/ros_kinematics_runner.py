@@ -52,7 +52,7 @@ ROTATION_TOLERANCE_RAD = 1.0e-3
 
 @dataclass(frozen=True, slots=True)
 class _PoseResult:
-    """Result for a target pose; errors are those of the first solution, infinite without a solution."""
+    """Result for a target pose, with the errors of the first solution; infinite without a solution."""
 
     time_s: float
     solutions: int
@@ -115,7 +115,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
 def check_solver(name: str) -> None:
     """Raises ModeError if the setting `solver` is not one of SOLVERS."""
     if name not in SOLVERS:
-        raise ModeError(f"solver '{name}': allowed are {', '.join(filter(None, SOLVERS))}")
+        raise ModeError(f"solver '{name}'; allowed: {', '.join(filter(None, SOLVERS))}")
 
 
 def solver_parameters(parameters: Mapping[str, Any], group: str) -> dict[str, Any]:

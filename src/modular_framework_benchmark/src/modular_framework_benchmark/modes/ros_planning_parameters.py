@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the ROS parameters of the mode `planning`, which are those of the planning pipeline."""
+"""Reads the ROS parameters of the mode `planning`: the parameters of the planning pipeline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOT_READ = {"seed": "each episode has its own seed", "capabilities": "this mode 
 
 
 def pipeline_parameters(parameters: Mapping[str, Any], pipeline: str) -> dict[str, Any]:
-    """Returns the nested parameters of a pipeline; those of the pipeline take precedence over those of the node.
+    """Returns the nested parameters of a pipeline, which take precedence over parameters of the node.
 
     Args:
         parameters: Values by full name.
@@ -35,7 +35,7 @@ def pipeline_parameters(parameters: Mapping[str, Any], pipeline: str) -> dict[st
         key = name.removeprefix(own).removeprefix(NODE).partition("/")[0]
         is_read = name.startswith(own) or (name.startswith(NODE) and key in declared)
         if not is_read or key in NOT_READ:
-            reason = NOT_READ[key] if is_read else f"allowed are names below {own}{nearest(name, read)}"
+            reason = NOT_READ[key] if is_read else f"allowed: names below {own}{nearest(name, read)}"
             faults.append(f"parameter '{name}' has no effect in this mode; {reason}")
     if faults:
         raise ModeError("; ".join(faults))

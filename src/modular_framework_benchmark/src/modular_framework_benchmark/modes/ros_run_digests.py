@@ -148,7 +148,7 @@ def _stack_digests(stack: StackPreview, changed: Mapping[str, Any]) -> Digests:
 
     Args:
         stack: Launch with its parameters and nodes.
-        changed: Parameters that override those of the launch.
+        changed: Parameters that override the parameters of the launch.
     """
     for name, value in stack.preview.parameters.items():
         yield f"parameter {name}", _digest(json.dumps(value, sort_keys=True, default=str))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Metrics of an episode, computed from its recording."""
+"""Predicates on the world: success criteria and milestones of a task."""

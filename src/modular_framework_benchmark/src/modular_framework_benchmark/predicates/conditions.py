@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Conditions on the objects of an episode.
 
-Frames are those of the simulation: the world frame has z up; the frame of a model is that of its SDF file. The box of
+Frames are as in the simulation: the world frame has z up; the frame of a model is the frame in its SDF file. The box of
 an object is the bounding box of its collision shapes in the model frame. "At the start" is the start of the task.
 """
 

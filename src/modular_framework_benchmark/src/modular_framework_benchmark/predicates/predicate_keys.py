@@ -30,7 +30,7 @@ class PredicateKey:
         kind: Kind of the value.
         low: Smallest number.
         high: Largest number.
-        extra: Allowed names besides those of models.
+        extra: Allowed names that are not models.
     """
 
     kind: KeyKind
@@ -62,7 +62,7 @@ def name(kind: KeyKind, *extra: str, default: str = "") -> Any:
 
     Args:
         kind: Kind of the name.
-        *extra: Allowed names besides those of models.
+        *extra: Allowed names that are not models.
         default: Name of an absent key; "" if the key must be present or has the default of its kind.
     """
     metadata = {_KEY: PredicateKey(kind, extra=extra)}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Records that the other rooms exchange: the description of an experiment, episodes and their results."""
+"""Records that the other packages exchange: the description of an experiment, episodes and their results."""

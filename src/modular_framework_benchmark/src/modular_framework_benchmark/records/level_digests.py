@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Digests of the content that episodes run with, in text form, by combination of factor levels.
 
-The text lists the digests of most combinations, and those of the other combinations as DIGEST@COMBINATION. A text
-without combinations, such as one digest, therefore holds for all.
+The text lists the digests of most combinations, and the other digests as DIGEST@COMBINATION. A text without
+combinations, such as one digest, therefore holds for all.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """Compares two experiments with the same factors to find regressions and improvements.
 
 Episodes of the two experiments with equal method, levels, trial and seed are pairs, because they share the scene. The
-statistics are those of a comparison of two methods.
+statistics are as in a comparison of two methods.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ class MetricChange:
     Attributes:
         method: Name of the method.
         metric: Compared metric.
-        comparison: Comparison whose first method is the later experiment and whose second is the earlier one.
+        comparison: Comparison whose first method is the later experiment and whose second method is the earlier
+            experiment.
     """
 
     method: str

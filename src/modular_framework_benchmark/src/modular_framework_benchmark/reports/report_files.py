@@ -10,7 +10,7 @@ from modular_framework_core.files.atomic_files import write_atomically
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Writes a file; an existing file is kept until the new one is complete.
+    """Writes a file; an existing file is kept until the new file is complete.
 
     Raises:
         ReportError: The file is not writable.

@@ -69,7 +69,7 @@ def open_source(target: str, name: str | None) -> Iterator[OpenedExperiment]:
 
     Args:
         target: Database as named by the user.
-        name: Name of the experiment; None for the only one.
+        name: Name of the experiment; None for the only experiment.
 
     Raises:
         ReportError: The database has several experiments and none is named, or is empty.
@@ -85,7 +85,7 @@ def find_experiment(database: ResultDatabase, name: str | None) -> int:
 
     Args:
         database: Open database.
-        name: Name of the experiment; None for the only one.
+        name: Name of the experiment; None for the only experiment.
 
     Raises:
         ReportError: The database has several experiments and none is named, or is empty.
@@ -99,4 +99,4 @@ def find_experiment(database: ResultDatabase, name: str | None) -> int:
     if not stored:
         raise ReportError(f"{database.label} has no experiment; run one into it first")
     names = ", ".join(item.description.name for item in stored)
-    raise ReportError(f"{database.label} has {len(stored)} experiments: {names}; name one with --experiment")
+    raise ReportError(f"{database.label} has {len(stored)} experiments: {names}; name an experiment with --experiment")

@@ -218,7 +218,7 @@ def _are_same(name: str, sides: Sequence[Set[str]], *, pooled: bool) -> bool:
     Args:
         name: Path of keys.
         sides: Values before and after; empty if unknown.
-        pooled: Whether the values are those of several combinations of levels.
+        pooled: Whether the values belong to several combinations of levels.
     """
     before, after = sides
     if name.endswith(IMPLEMENTATION) and not (before and after):

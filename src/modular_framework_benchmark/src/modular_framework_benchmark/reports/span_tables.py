@@ -67,7 +67,7 @@ def choose_episodes(
 ) -> tuple[ChosenEpisode, ...]:
     """Returns a success of median duration and the first failure of the most frequent cause for each method.
 
-    At most MOST_TIMELINES episodes are returned, those of the first methods.
+    At most MOST_TIMELINES episodes are returned, from the first methods.
 
     Args:
         results: Finished episodes.

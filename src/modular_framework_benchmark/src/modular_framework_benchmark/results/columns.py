@@ -28,7 +28,7 @@ def check_names(description: ExperimentDescription) -> None:
     faults += [f"factor {each!r}: the name is taken" for each in factors if each in taken]
     faults += [f"factor {each!r} is there twice" for each in sorted(set(factors)) if factors.count(each) > 1]
     if description.compared not in {factor.name for factor in description.factors}:
-        faults.append(f"compared factor {description.compared!r}: allowed are {', '.join(factors) or 'none'}")
+        faults.append(f"compared factor {description.compared!r}: allowed: {', '.join(factors) or 'none'}")
     if faults:
         raise DescriptionError(
             f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; allowed: names that differ in "

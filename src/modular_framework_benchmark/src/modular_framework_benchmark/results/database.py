@@ -138,7 +138,7 @@ class ResultDatabase:
         return self._address.path.parent if self._address.path else Path.cwd()
 
     def prepare(self, *, read_only: bool) -> bool:
-        """Checks the database, creates the tables of a new one, and imports waiting records; see `open_database`.
+        """Checks the database, creates the tables of a new database, and imports waiting records; see `open_database`.
 
         Returns:
             Whether the tables have this release's version; tables opened read-only may be older.
@@ -221,11 +221,11 @@ class ResultDatabase:
         return int(known[name])
 
     def check_resumed(self, number: int, ran_with: Mapping[str, str]) -> None:
-        """Checks that the remaining episodes run with what an experiment ran with before.
+        """Checks that the remaining episodes run with the files, packages and parameters of the finished episodes.
 
         Args:
             number: Identifier of the experiment.
-            ran_with: Digests of what the remaining episodes will run with, see `run_digests`.
+            ran_with: Digests for the remaining episodes, see `run_digests`.
 
         Raises:
             ExperimentChangedError: A file, a package or a parameter is different.
@@ -293,7 +293,9 @@ class ResultDatabase:
             record = None if row is None else read_record(connection, row, description)
         if record is None:
             state = "is not finished" if row is not None else "does not exist"
-            raise ResultsError(f"{self.label}: episode {episode} of {description.name!r} {state}; name a finished one")
+            raise ResultsError(
+                f"{self.label}: episode {episode} of {description.name!r} {state}; name a finished episode"
+            )
         return record
 
     def load(self, number: int, *, spans: bool = True) -> ExperimentResults:

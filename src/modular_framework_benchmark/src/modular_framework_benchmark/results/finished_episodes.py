@@ -26,7 +26,7 @@ STATUS_VALUES = {status: value for value, status in enumerate(EpisodeStatus)}
 def store_record(
     connection: Connection, number: int, description: ExperimentDescription, record: EpisodeRecord
 ) -> bool:
-    """Stores the record of an episode unless one is stored already.
+    """Stores the record of an episode unless the database has its record already.
 
     Args:
         connection: Connection to the database.
@@ -72,7 +72,7 @@ def store_record(
 
 
 def find_episode(connection: Connection, number: int, key: str) -> Row[Any] | None:
-    """Returns the row of a planned episode, or None if there is none.
+    """Returns the row of a planned episode; None for an episode that is not planned.
 
     Args:
         connection: Connection to the database.

@@ -95,7 +95,7 @@ class LeRobotWriter:
             succeeded: Whether the episode succeeded.
 
         Raises:
-            ExportError: The features differ from those of the first episode, or a video is unreadable.
+            ExportError: The first episode has other features, or a video is unreadable.
         """
         self._check_features(frames, videos)
         row: dict[str, Any] = {"episode_index": self.episodes, "tasks": [task], "length": frames.count}

@@ -58,7 +58,7 @@ def export_lerobot(
         ExportError: The folder is not empty, the rate is not positive, or no episode can be exported.
     """
     if frames_per_second < 1:
-        raise ExportError(f"{frames_per_second} frames a second: allowed are whole numbers from 1; name another rate")
+        raise ExportError(f"{frames_per_second} frames a second; allowed: whole numbers from 1")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ExportError(f"{folder}: already exists; remove it, or name another folder")
     skipped: dict[int, str] = {}

@@ -47,7 +47,7 @@ def image_statistics(images: NDArray[np.uint8]) -> FeatureStatistics:
 
 
 def joined_statistics(parts: Sequence[FeatureStatistics]) -> FeatureStatistics:
-    """Returns the statistics of the dataset from those of its episodes.
+    """Returns the statistics of the dataset from the statistics of its episodes.
 
     Mean and deviation are exact (Chan et al., parallel variance). Quantiles cannot be combined exactly: as in LeRobot,
     lower quantiles are the minimum and upper quantiles the maximum over the episodes.

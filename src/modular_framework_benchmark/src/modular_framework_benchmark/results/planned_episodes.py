@@ -115,7 +115,7 @@ def _stored_combinations(connection: Connection, number: int) -> list[str]:
 
 
 def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str], pending: Sequence[EpisodeSpec]) -> None:
-    """Checks that the remaining episodes of an experiment use the same files, packages and parameters as the first.
+    """Checks that the remaining episodes of an experiment use the files, packages and parameters of the first episodes.
 
     Args:
         stored: Description of the experiment in the database.

@@ -33,7 +33,7 @@ class DiskGuard:
         self._largest = max(self._largest, size)
 
     def reason_to_stop(self, running: int) -> str:
-        """Returns the reason why no episode may start; "" if one may.
+        """Returns the reason why no episode may start; "" if an episode may start.
 
         Args:
             running: Number of running episodes; each is assumed to need as much space as the largest episode so far.

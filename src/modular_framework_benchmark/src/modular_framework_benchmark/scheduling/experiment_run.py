@@ -90,9 +90,9 @@ class EpisodeQueue:
     def next_for(self, slot: str, alone: bool = False) -> EpisodeSpec | None:
         """Returns the next episode for a slot, or None without an episode for it.
 
-        A slot runs the episodes of one stack, then those of the next unassigned stack. Without an unassigned stack, it
-        helps the slot with most remaining episodes. It leaves that slot the last episode if it would have to start
-        another stack for it.
+        A slot runs the episodes of one stack, then the episodes of the next unassigned stack. Without an unassigned
+        stack, it helps the slot with most remaining episodes. It does not take the last episode of that slot if it
+        would have to start another stack for this episode.
 
         Args:
             slot: Name of the slot.

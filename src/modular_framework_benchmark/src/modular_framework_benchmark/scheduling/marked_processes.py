@@ -17,7 +17,7 @@ def marked_processes(mark: str) -> list[int]:
     """Returns the ids of other processes whose mark starts with a text.
 
     Args:
-        mark: RUN/ for all processes of a run, or RUN/WORKER/ for those of a worker.
+        mark: RUN/ for all processes of a run, or RUN/WORKER/ for the processes of a worker.
     """
     return processes_with(MARK, mark, prefix=True)
 

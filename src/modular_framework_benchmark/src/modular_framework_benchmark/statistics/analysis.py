@@ -73,7 +73,7 @@ def summarise_by_level(results: ExperimentResults, factor: str) -> tuple[MethodS
     """Returns the summary of every method for every metric at each level of another factor, without comparisons.
 
     Raises:
-        ValueError: The experiment lacks the factor, or the factor is the compared one.
+        ValueError: The experiment lacks the factor, or compares its levels.
     """
     return tuple(
         summary
@@ -139,11 +139,11 @@ def _levels(results: ExperimentResults, name: str) -> tuple[str, ...]:
         if factor.name == name:
             return factor.levels
     known = ", ".join(factor.name for factor in other_factors(results)) or "none"
-    raise ValueError(f"'{name}' is not a factor beside the compared one; these factors are: {known}")
+    raise ValueError(f"'{name}' is not a factor besides the compared factor; allowed: {known}")
 
 
 def _main_sentences(results: ExperimentResults, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
-    """Returns the sentences on success, then those on differences that are shown, then all others."""
+    """Returns the sentences on success, then the sentences on differences that are shown, then all others."""
     if not comparisons:
         return (f"nothing to compare: the only method is {', '.join(methods_of(results)) or 'none'}",)
     shown = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
@@ -171,7 +171,7 @@ def _rule(results: ExperimentResults, comparisons: int) -> str:
 
 
 def _scope(results: ExperimentResults) -> str:
-    """Returns the population that the claims cover: the units, their family_index and the fixed levels."""
+    """Returns the population that the claims cover: the units, their number and the fixed levels."""
     if results.episodes.empty:
         return ""
     table = EpisodeTable(results)

@@ -44,8 +44,8 @@ class Settings:
     Attributes:
         confidence: Confidence level of the intervals.
         at_any_time: Whether tests and intervals must be anytime-valid.
-        mean_intervals: Whether the mean differences of all bounded metrics get a betting interval, not only those of
-            partial credit.
+        mean_intervals: Whether the mean differences of all bounded metrics get a betting interval, not only the
+            differences of partial credit.
     """
 
     confidence: float

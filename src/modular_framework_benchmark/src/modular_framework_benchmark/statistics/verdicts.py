@@ -143,7 +143,7 @@ def _notes(
         _broken_note(finding, verdicts),
     )
     remaining = (
-        f"unfinished: {len(results.episodes)} of {results.planned} episodes; nothing is claimed before the last one"
+        f"unfinished: {len(results.episodes)} of {results.planned} episodes; nothing is claimed before the last episode"
     )
     return (*(note for note in notes if note), *((remaining,) if unfinished(results) else ()))
 

@@ -81,7 +81,7 @@ class ArmMotion:
 
     @property
     def finished(self) -> bool:
-        """Returns whether a MOVE has reached its target or a STOP has come to rest."""
+        """Returns whether a MOVE has reached its target or a STOP has ended at rest."""
         at_rest = max(map(abs, self.velocities)) <= _ARRIVED
         if self.command.drive is Drive.MOVE:
             return at_rest and all(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Misspelt names and impossible values at every place of an experiment, a task and a launch, with their refusals."""
+"""Misspelt names and impossible values in every part of an experiment, a task and a launch, with their refusals."""
 
 from __future__ import annotations
 
@@ -509,7 +509,7 @@ CASES = [
         PLANNING,
         ("parameters",),
         {"/robot_description_planning/joint_limits/panda_joint1/max_velocity": 1.0},
-        "no effect in this mode; allowed are names below /move_group/planning_pipelines/ompl/",
+        "no effect in this mode; allowed: names below /move_group/planning_pipelines/ompl/",
     ),
     in_experiment(PLANNING, ("parameters",), {"/move_group/seed": 4}, "each episode has its own seed"),
     in_experiment(
@@ -517,8 +517,8 @@ CASES = [
     ),
     in_experiment(KINEMATICS, ("parameters",), {"/planer_name": "RRT"}, "no effect in this mode"),
     in_experiment(KINEMATICS, ("factors", "group"), ["panda_arm", "panda_amr"], "panda_arm"),
-    in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed are closed form, numeric"),
-    in_experiment(KINEMATICS, ("solver",), "kdl_kinematics_plugin/KDLKinematicsPlugin", "allowed are closed form"),
+    in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed: closed form, numeric"),
+    in_experiment(KINEMATICS, ("solver",), "kdl_kinematics_plugin/KDLKinematicsPlugin", "allowed: closed form"),
     in_experiment(GRASPS, ("gripper_joint",), "panda_finger_joint", "panda_finger_joint1"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearance": "wide"}, "is 'wide'; allowed: a number"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearence": 0.01}, "did you mean 'finger_clearance'"),

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Has the shipped task pick one object after the other in one running simulation, and prints each result.
+"""Runs the shipped task on one object after another in a running simulation, and prints each result.
 
 Run as a node beside `start_framework.launch ... end_with_task:=false`:
 
     python3 -m modular_framework_testing.picks.pick_objects TASK_SCRIPT [CASE ...]
 
 Every line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases, all by default, are the objects
-of the standard set and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can,
-and with the other the fingers touch the can before they close.
+of the standard set and `second_try`: a can whose first two grasps are bad. The gripper cannot lift the can with the
+first grasp; with the second, the fingers touch the can before they close.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def height(name: str) -> float:
 
 
 class Picker:
-    """Puts objects on the table and has the task pick them."""
+    """Puts objects on the table and runs the task to pick them."""
 
     def __init__(self, script: str) -> None:
         self._script, self._signals = script, 0
@@ -110,7 +110,7 @@ class Picker:
         self._signals += 1
 
     def pick(self, case: str, model: str, task_runs: bool) -> dict[str, Any]:
-        """Has the task pick an object.
+        """Runs the task to pick an object.
 
         Args:
             case: Name of the case.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures one SIGINT during a simulated pick: end of the task, rest of the arm, remaining processes."""
+"""Measures the effect of a SIGINT during a simulated pick: end of the task, rest of the arm, remaining processes."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def _print_failure(log: str) -> None:
 
 
 def _samples(speeds: Path, pressed: float) -> list[tuple[float, float]]:
-    """Returns the times since the signal [s], and the speed of the fastest joint at each of them [rad/s]."""
+    """Returns the times since the signal [s], and the speed of the fastest joint at each time [rad/s]."""
     rows = [line.split() for line in speeds.read_text().splitlines()]
     return [(float(row[0]) - pressed, float(row[1])) for row in rows if len(row) == 2]
 

@@ -32,7 +32,7 @@ from modular_framework_testing.planning.independent_checker import (
 
 TIP = "wrist_3_link"
 NEAR = 0.002  # [m]; nearer than that a free state may be refused
-FINEST, DENSE = 4.0e-5, 4.0e-3  # [rad or m]; between samples of the checked edges, and of those of the second checker
+FINEST, DENSE = 4.0e-5, 4.0e-3  # [rad or m]; between samples of edges: checked, and of the second checker
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class Comparison:
         return total
 
     def _edge(self, start: np.ndarray, end: np.ndarray) -> Verdicts:
-        """A free motion is sampled densely for the second checker; of a refused one, the state said to touch."""
+        """The second checker gets dense samples of a free motion, and the colliding state of a refused motion."""
         edge, names = np.array([start, end]), self.ours.model.joint_names
         touching = self.ours.colliding_state(edge, FINEST)
         if touching is None:
@@ -203,7 +203,7 @@ def compared_around(
 ) -> Comparison:
     """Compares both checkers among ten shapes of all kinds, within reach of the links that move most.
 
-    Pairs of bodies without relative motion are left out, as by the checker of the planner.
+    Pairs of bodies without relative motion are left out, as in the checker of the planner.
 
     Args:
         model: Robot.

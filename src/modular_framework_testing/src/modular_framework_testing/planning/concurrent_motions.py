@@ -38,7 +38,7 @@ Motion = tuple[tuple[float, tuple[float, ...]], ...]
 
 
 def put_up_walls() -> None:
-    """Puts obstacles between the positions, so that there is something to search."""
+    """Puts obstacles between the positions, so that straight motions collide."""
     assert add(box("right", 0.33, 0.42, 1.0, (0.12, 0.12, 0.4)), box("left", -0.33, 0.42, 1.0, (0.12, 0.12, 0.4)))
 
 

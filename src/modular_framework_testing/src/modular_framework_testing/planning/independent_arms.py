@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two arms with a forward kinematics that shares no code with the planner.
 
-The UR5's Denavit-Hartenberg lengths and the joint frames of the seven-joint arm (those of a Franka Panda) are public.
+The UR5's Denavit-Hartenberg lengths and the joint frames of the seven-joint arm, a Franka Panda, are public.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ UR5_A = (0.0, -0.425, -0.39225, 0.0, 0.0, 0.0)  # [m]
 UR5_ALPHA = (math.pi / 2, 0.0, 0.0, math.pi / 2, -math.pi / 2, 0.0)  # [rad]
 
 _UP, _DOWN = math.pi / 2, -math.pi / 2
-SEVEN_JOINTS = (  # position [m] and turn about x [rad] of each joint in the frame of the one before, bounds [rad]
+SEVEN_JOINTS = (  # position [m] and turn about x [rad] of each joint in the frame of the previous joint, bounds [rad]
     ((0.0, 0.0, 0.333), 0.0, (-2.8973, 2.8973)),
     ((0.0, 0.0, 0.0), _DOWN, (-1.7628, 1.7628)),
     ((0.0, -0.316, 0.0), _UP, (-2.8973, 2.8973)),

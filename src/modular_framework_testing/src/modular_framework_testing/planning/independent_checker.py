@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A second collision checker: its own forward kinematics of many states at once, one FCL call per pair of bodies.
 
-Shares with the planner only the reader of mesh files and the refusal of DOCTYPEs. Pairs are left out where a sphere
-around one body does not reach the box around the other.
+Shares with the planner only the reader of mesh files and the refusal of DOCTYPEs. Pairs are left out if a sphere around
+a body does not reach the box around the other body.
 """
 
 from __future__ import annotations
@@ -244,7 +244,7 @@ class IndependentChecker:
         ]
 
     def set_world(self, objects: World, base_moves: bool = False) -> None:
-        """Replaces the world: name, solid, pose in the planning frame; only a base that moves can touch it."""
+        """Replaces the world: name, solid, pose in the planning frame; only a moving base can touch the world."""
         self.parts = self.parts[: self._robot_parts]
         self.pairs = self._robot_pairs()
         base = self._moving_root(self._links[0])
@@ -320,7 +320,7 @@ class IndependentChecker:
         return found
 
     def distance(self, positions: Mapping[str, float]) -> float:
-        """The smallest distance of bodies that may not touch [m]; 0 or less where some do."""
+        """The smallest distance of bodies that may not touch [m]; 0 or less if bodies touch."""
         poses, best = self._part_poses(positions, 1)[0], np.inf
         for pair in self.pairs:
             first, second = (

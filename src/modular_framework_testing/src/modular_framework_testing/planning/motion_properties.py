@@ -106,7 +106,7 @@ def _free_state(
 
 
 def problems(model: RobotModel, kind: str, count: int, seed: int) -> Iterator[Problem]:
-    """Yields problems with random worlds, starts and goals; every second one has a path constraint, lines excepted.
+    """Yields problems with random worlds, starts and goals; every second problem has a path constraint, except lines.
 
     The goal of a line is the pose of the tip in a state near the start, so that the goal can be reached.
 
@@ -223,7 +223,7 @@ def _goal_faults(model: RobotModel, problem: Problem, end: np.ndarray) -> list[s
 def _groundless(model: RobotModel, checker: IndependentChecker, problem: Problem, kind: str) -> list[str]:
     """Returns the fault of a refusal: the straight motion of a point-to-point command must be in collision.
 
-    The path constraints hold along this motion, by the way they are drawn.
+    Random path constraints are chosen to hold along this motion.
     """
     if kind != "ptp":
         return []

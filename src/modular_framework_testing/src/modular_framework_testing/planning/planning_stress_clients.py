@@ -42,11 +42,11 @@ from modular_framework_testing.planning.planning_wire import (
 CHANGE_PERIOD_S = 0.1
 ANSWER_TIMEOUT_S = 40.0
 PAN = ARM[0]
-WAY = -1.2  # [rad] how far the questions with an own wall turn the shoulder
+WAY = -1.2  # [rad] rotation of the shoulder in requests with a separate wall
 SIZE = (0.08, 0.08, 0.3)
 IN_COLLISION = MoveItErrorCodes.GOAL_IN_COLLISION
 TIMED_OUT = (MoveItErrorCodes.TIMED_OUT, MoveItErrorCodes.PLANNING_FAILED)
-FLIPPER = "flipper"  # the client that changes the scene all the time
+FLIPPER = "flipper"  # the client that changes the scene continuously
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Clients:
             self.errors.append(f"{work.__name__}: {type(error).__name__}: {error}")
 
     def _change(self, _: int) -> None:
-        """Moves a box between two places, at fixed times."""
+        """Moves a box between two positions, at fixed times."""
         places = {"flip": wall_at(0.7, "flip"), "flop": wall_at(1.0, "flop")}
         self._world.change(FLIPPER, places["flop"])
         due = time.monotonic()
@@ -237,7 +237,7 @@ class MemoryWatch:
 
 
 def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -> dict[str, Any]:
-    """Starts move_group, lets the clients ask, and judges every answer afterwards.
+    """Starts move_group, runs the clients, and judges every response afterwards.
 
     Args:
         session: Running `RosSession`.
@@ -255,7 +255,7 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
     time.sleep(0.5)
     world = World()
     world.change("crate", box("crate", 0.0, -0.6, 1.0, (0.3, 0.3, 0.3)))
-    plan(request(joint_goal(PAN, START[0] + 0.1)))  # what is made on first use is made now
+    plan(request(joint_goal(PAN, START[0] + 0.1)))  # objects that are made on first use are made now
     memory, asking = MemoryWatch(), Clients(world, seconds)
     unanswered = asking.run(clients)
     rss_start, rss_end, slope = memory.stop()

@@ -46,7 +46,7 @@ class World:
         history.append(Change(begun, time.monotonic(), objects))
 
     def objects_between(self, begun: float, ended: float) -> dict[str, CollisionObject]:
-        """Returns all objects that may have been in the scene during a span, by name."""
+        """Returns all objects that may have been in the scene during a period, by name."""
         return {
             name: item
             for history in self.histories.values()
@@ -56,14 +56,14 @@ class World:
         }
 
     def was_free_of(self, touched: set[str], begun: float, ended: float) -> bool:
-        """Returns whether, at some moment of a span, the scene may have had none of the touched objects.
+        """Returns whether, at some moment of a period, the scene may have had none of the touched objects.
 
         While a client waits for a response, its objects may be the old or the new ones.
 
         Args:
             touched: Names of the touched objects.
-            begun: Start of the span [s, monotonic].
-            ended: End of the span [s, monotonic].
+            begun: Start of the period [s, monotonic].
+            ended: End of the period [s, monotonic].
         """
         changes = [item for history in self.histories.values() for item in history]
         moments = {

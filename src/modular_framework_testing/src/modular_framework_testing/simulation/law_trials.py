@@ -134,14 +134,14 @@ def rolled(make: MakeWorld, shape: specs.Geometry, moments: Vector3, turn: Vecto
 
 
 def roll_cylinder(make: MakeWorld) -> Outcome:
-    """A cylinder rolls down a slope with two thirds of what it would slide with."""
+    """A cylinder rolls down a slope with two thirds of the acceleration of sliding."""
     across, along = 1 * (3 * 0.05**2 + 0.1**2) / 12, 0.05**2 / 2
     shape = specs.Cylinder(0.05, 0.1)
     return rolled(make, shape, (across, across, along), (math.pi / 2, 0, 0), 0.5)
 
 
 def roll_ball(make: MakeWorld) -> Outcome:
-    """A ball rolls down a slope with five sevenths of what it would slide with."""
+    """A ball rolls down a slope with five sevenths of the acceleration of sliding."""
     return rolled(make, specs.Sphere(0.05), (0.4 * 0.05**2,) * 3, (0, 0, 0), 0.4)
 
 
