@@ -95,6 +95,27 @@ def test_the_opening_is_the_distance_of_the_pads_over_the_whole_stroke(urdf: str
     assert abs(gripper.axes[:, 0]) == pytest.approx([0.0, 1.0, 0.0]) and gripper.axes[:, 2] == pytest.approx([0, 0, 1])
 
 
+def test_a_chain_of_mimic_joints_moves_like_the_same_relations_to_the_driven_joint() -> None:
+    before, after = four_bar_hand().split('<joint name="right_i"')
+    chain = before + '<joint name="right_i"' + after.replace('mimic joint="drive"', 'mimic joint="right_drive"', 1)
+    assert chain != four_bar_hand()
+    gripper = measure_gripper(chain, "palm", "drive")
+    assert gripper.openings == pytest.approx(true_openings(four_bar_hand(), gripper), abs=TOLERANCE_M)
+    assert gripper.max_opening == pytest.approx(0.0859, abs=TOLERANCE_M)
+
+
+@pytest.mark.parametrize("second", [mimic("drive", 1.0), limit(0.05)], ids=["mimic tag", "none"])
+def test_the_length_of_an_axis_has_no_influence_on_the_stroke(second: str) -> None:
+    urdf = jaws(second, "0 -3 0").replace('xyz="0 1 0"', 'xyz="0 2 0"')
+    assert measure_gripper(urdf, "palm", "drive").max_opening == pytest.approx(0.1, abs=TOLERANCE_M)
+
+
+def test_mimic_joints_in_a_circle_are_refused() -> None:
+    urdf = jaws(mimic("other", 1.0))
+    with pytest.raises(GripperGeometryError, match="'other': it mimics itself through other -> other"):
+        measure_gripper(urdf, "palm", "drive")
+
+
 def test_the_fingertips_of_a_four_bar_hand_are_in_front_of_the_pads() -> None:
     gripper = measure_gripper(four_bar_hand(), "palm", "drive")
     assert (gripper.tips >= gripper.pad_centres + gripper.pad_half_height - TOLERANCE_M).all()

@@ -23,6 +23,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
     max_z_on_lines,
 )
 from modular_framework_core.grasp_generation.hand_axes import hand_axes
+from modular_framework_urdf.mimics import resolved
 from modular_framework_urdf.planning_groups import KinematicTree
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -288,13 +289,18 @@ class _Model:
         self.joints = {joint.name: joint for joint in robot.joints if joint.child}
         self._tree = KinematicTree({name: (joint.parent, joint.child) for name, joint in self.joints.items()})
         self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
+        mimics = {name: joint.mimic for name, joint in self.joints.items() if joint.mimic is not None}
+        try:
+            self._mimics = resolved(mimics, [joint.name for joint in robot.movable_joints()])
+        except ValueError as error:
+            raise GripperGeometryError(str(error)) from error
 
     def driven_joints(self, joint: str) -> set[str]:
         """Returns a joint and its mirrored joints; jaws with a common motor often have no mimic tag (Fetch)."""
         return {joint} | {name for name in self.joints if self._is_mirrored(self.joints[joint], self.joints[name])}
 
     def _is_mirrored(self, joint: Joint, other: Joint) -> bool:
-        axes = [self._origins[each.name][:3, :3] @ np.array(each.axis) for each in (joint, other)]
+        axes = [self._origins[each.name][:3, :3] @ _unit_axis(each) for each in (joint, other)]
         return (
             (joint.parent, joint.kind, joint.limit) == (other.parent, other.kind, other.limit)
             and joint.mimic is other.mimic is None
@@ -304,7 +310,7 @@ class _Model:
     def moving_links(self, joint: str) -> list[str]:
         """Returns the links moved by a joint, by its mirrored joints, or by mimic joints of these joints."""
         driven = self.driven_joints(joint)
-        driven |= {name for name, each in self.joints.items() if each.mimic is not None and each.mimic.leader in driven}
+        driven |= {name for name, mimic in self._mimics.items() if mimic.leader in driven}
         return [link for link in self.links if any(name in driven for name, _ in self._tree.up(link))]
 
     def hand_links(self, joint: str) -> list[str]:
@@ -333,22 +339,31 @@ class _Model:
         """Returns the pose of a link in the root link, shape (4, 4)."""
         transform = np.eye(4)
         for name, _ in self._tree.up(link):
-            transform = self._origins[name] @ _motion(self.joints[name], state) @ transform
+            transform = self._origins[name] @ _motion(self.joints[name], self._position(name, state)) @ transform
         return transform
 
+    def _position(self, joint: str, state: dict[str, float]) -> float:
+        mimic = self._mimics.get(joint)
+        if mimic is None:
+            return state.get(joint, 0.0)
+        return mimic.multiplier * state.get(mimic.leader, 0.0) + mimic.offset
 
-def _motion(joint: Joint, state: dict[str, float]) -> Array:
-    """Returns the transform of a joint position relative to the joint origin, shape (4, 4)."""
-    value = state.get(joint.name, 0.0)
-    if joint.mimic is not None:
-        value = joint.mimic.multiplier * state.get(joint.mimic.leader, 0.0) + joint.mimic.offset
-    axis = np.array(joint.axis)
+
+def _motion(joint: Joint, value: float) -> Array:
+    """Returns the transform of a joint position [rad or m] relative to the joint origin, shape (4, 4)."""
+    axis = _unit_axis(joint)
     transform = np.eye(4)
     if joint.kind == "prismatic":
         transform[:3, 3] = axis * value
     elif joint.kind in ("revolute", "continuous"):
         transform[:3, :3] = rotation_about(axis, value)
     return transform
+
+
+def _unit_axis(joint: Joint) -> Array:
+    """Returns the axis of a joint in the joint frame as a unit vector, shape (3,)."""
+    axis = np.array(joint.axis)
+    return axis / (np.linalg.norm(axis) or 1.0)
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
