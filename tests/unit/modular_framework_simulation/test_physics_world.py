@@ -219,6 +219,8 @@ def test_an_object_in_urdf_is_read_with_weight_and_friction(world: PhysicsWorld)
     [
         ("<joint name='t' type='continuous'><parent link='a'/><child link='b'/><mimic joint='t'/></joint>", "t -> t"),
         ("<xacro:include filename='x'/>", "is xacro"),
+        ("<link name='c'><xacro:body/></link>", "body>: is xacro"),
+        ("<gazebo><plugin name='p' filename='f'><xacro:gains/></plugin></gazebo>", "gains>: is xacro"),
     ],
 )
 def test_an_object_in_urdf_that_defines_itself_or_is_not_expanded_is_refused(inside: str, fault: str) -> None:

@@ -58,6 +58,7 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     root = parse_xml(text, source)
     if root.tag != "robot":
         raise DescriptionError(root.where, f"the root element is <{root.tag}>", "allowed: <robot>")
+    _refuse_xacro(root)
     joint_nodes = root.find_all("joint")
     parents = {_role(joint, "child"): joint for joint in joint_nodes}
     nodes = [link for link in root.find_all("link") if link.name() != "world"]
@@ -66,8 +67,6 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     notes = Notes()
     extensions = UrdfExtensions(root, notes)
     for child in root.children:
-        if child.tag.startswith(XACRO_TAGS):
-            raise DescriptionError(child.where, "is xacro", "allowed: URDF; expand the file with xacro first")
         if child.tag not in _SUPPORTED_TAGS:
             notes.add(child, "has no effect", child.tag)
     colours = _named_colours(root)
@@ -106,6 +105,13 @@ def collision_name(name: str, link: str, index: int) -> str:
         index: Index of the <collision> in the link, from 0.
     """
     return name or (f"{link}_collision_{index}" if index else f"{link}_collision")
+
+
+def _refuse_xacro(node: XmlNode) -> None:
+    if node.tag.startswith(XACRO_TAGS):
+        raise DescriptionError(node.where, "is xacro", "allowed: URDF; expand the file with xacro first")
+    for child in node.children:
+        _refuse_xacro(child)
 
 
 def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:
