@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
@@ -130,6 +131,65 @@ def test_a_controller(tmp_path: Path) -> None:
     *log, position = recipe.run(LOOP).splitlines()
     assert any("parameter 'gaol'" in line and "did you mean 'goal'" in line for line in log)
     assert float(position) == pytest.approx(0.8, abs=1e-3)
+
+
+GAZEBO = "src/modular_framework_simulation/src/modular_framework_simulation/gazebo_ros"
+SWING = """
+import math
+from pathlib import Path
+
+from gazebo_msgs.srv import GetJointPropertiesRequest
+from modular_framework_simulation.gazebo_ros.joint_services import JointServices
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_testing.simulation.simulated_samples import jointed, run
+
+
+class Served:
+    def __init__(self):
+        self.works = {}
+
+    def serve(self, name, kind, work):
+        self.works[name] = work
+
+    command = serve
+
+
+world = PhysicsWorld(PhysicsSettings(1_000_000), ConvexParts(Path("parts")), (0.0, 0.0, -9.81))
+world.spawn(jointed("pendulum", 0.5))
+run(world, 0.2)
+served = Served()
+JointServices(world).connect(served)
+radians, degrees = (
+    served.works[f"/gazebo/get_joint_{name}"](GetJointPropertiesRequest("pendulum::hinge")).position[0]
+    for name in ("properties", "degrees")
+)
+print(radians, degrees)
+"""
+
+
+def test_a_gazebo_service(tmp_path: Path) -> None:
+    recipe = Recipe("A gazebo service", "modular_framework_simulation", tmp_path)
+    recipe.insert(
+        f"{GAZEBO}/ros_names.py", "SET_JOINT_PROPERTIES =", 'GET_JOINT_DEGREES = "/gazebo/get_joint_degrees"\n'
+    )
+    services = f"{GAZEBO}/joint_services.py"
+    recipe.insert(
+        services,
+        "        endpoints.serve(ros_names.SET_JOINT_PROPERTIES",
+        "        endpoints.serve(ros_names.GET_JOINT_DEGREES, srv.GetJointProperties, self._get_degrees)\n",
+    )
+    recipe.insert(
+        services,
+        "    def _set_properties(",
+        "    def _get_degrees(self, request: Any) -> Any:\n"
+        "        response = self._get_properties(request)\n"
+        "        response.position = [math.degrees(value) for value in response.position]\n"
+        "        return response\n\n",
+    )
+    radians, degrees = map(float, recipe.run(SWING).split())
+    assert radians > 0.1 and degrees == pytest.approx(math.degrees(radians))
 
 
 PHYSICS = "src/modular_framework_simulation/src/modular_framework_simulation/physics"
