@@ -146,7 +146,16 @@ success:
     assert found["cube"].progress[0].predicate == HeldFor(object="cube_1")
 
 
-def test_progress_is_measured_only_with_milestones(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("metric", "given", "fault"),
+    [
+        ("progress", ("success:", f"{PROGRESS}\nsuccess:"), "needs milestones; list them in the key progress"),
+        ("hold_time", ("success: {", "success: {shake: 2, "), "needs a shake; add shake: SECONDS to the key success"),
+    ],
+)
+def test_a_metric_that_no_episode_can_have_is_left_out(
+    metric: str, given: tuple[str, str], fault: str, tmp_path: Path
+) -> None:
     known = {"task": {name: entry.metric for name, entry in METRICS.items()}}
 
     def names(text: str) -> list[str]:
@@ -155,11 +164,12 @@ def test_progress_is_measured_only_with_milestones(tmp_path: Path) -> None:
             metric.name for metric in read_experiment(text, tmp_path / "a.yaml", resources, known).description.metrics
         ]
 
-    every = PICK.replace("metrics: [success, task_time]\n", "")
-    assert "progress" not in names(every) and "progress" in names(f"{every}\n{PROGRESS}\n")
-    assert "progress" in names(f"{PICK.replace('[success, task_time]', '[success, progress]')}\n{PROGRESS}\n")
-    with pytest.raises(ExperimentFault, match="the metric 'progress' needs milestones; list them in the key progress"):
-        names(PICK.replace("[success, task_time]", "[success, progress]"))
+    every = PICK.replace("metrics: [success, task_time]\n", "").replace("lifted: 0.1", "lifted: 0.1, hold_time: 2")
+    listed = PICK.replace("[success, task_time]", f"[success, {metric}]")
+    assert metric not in names(every) and metric in names(every.replace(*given))
+    assert metric in names(listed.replace(*given))
+    with pytest.raises(ExperimentFault, match=f"the metric '{metric}' {fault}"):
+        names(listed)
 
 
 def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:

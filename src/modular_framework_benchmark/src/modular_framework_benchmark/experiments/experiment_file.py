@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from collections.abc import Mapping as Map
 from dataclasses import fields
 from pathlib import Path
@@ -25,7 +26,7 @@ from modular_framework_benchmark.experiments.modes import MODES
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
-from modular_framework_benchmark.records.episode_settings import MetricSpec, RecordedFiles, as_json
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, MetricSpec, RecordedFiles, as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
@@ -39,8 +40,11 @@ OPTIONAL = (
     "record",
 )  # fmt: skip
 KEYS = (*REQUIRED, *OPTIONAL)
-PROGRESS = "progress"
-"""Name of the metric of milestones, and of their key."""
+CONDITIONAL_METRICS: Map[str, tuple[Callable[[EpisodeSettings], bool], str]] = {
+    "progress": (lambda settings: settings.has_milestones, "milestones; list them in the key progress"),
+    "hold_time": (lambda settings: settings.is_shaken, "a shake; add shake: SECONDS to the key success"),
+}
+"""Metrics that only some episodes can have: whether an episode has the metric, and what the metric needs."""
 MAX_EPISODES = 10_000_000
 
 SettingChecks = Map[str, SettingsCheck]
@@ -274,13 +278,17 @@ class _Reader:
         budgets = {one.settings.budget_s for one in combinations}
         budget_s = budgets.pop() if len(budgets) == 1 else None
         node, known = self._root.entries.get("metrics"), dict(self._known.get(self._mode, {}))
-        has_progress = not combinations or any(one.settings.has_milestones for one in combinations)
-        if node is None and not has_progress:
-            known.pop(PROGRESS, None)
+        missing = {
+            name: needs
+            for name, (is_available, needs) in CONDITIONAL_METRICS.items()
+            if combinations and not any(is_available(one.settings) for one in combinations)
+        }
+        if node is None:
+            known = {name: metric for name, metric in known.items() if name not in missing}
         metrics, metric_specs = read_metrics(node, known, budget_s, self._reading)
-        if node is not None and not has_progress and PROGRESS in metric_specs:
-            text = f"the metric '{PROGRESS}' needs milestones; list them in the key {PROGRESS}"
-            self._reading.faults.add(node.location, text)
+        for name, needs in missing.items():
+            if node is not None and name in metric_specs:
+                self._reading.faults.add(node.location, f"the metric '{name}' needs {needs}")
         return metrics, metric_specs
 
     def _note_metric_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:

@@ -151,6 +151,11 @@ class TaskSettings(EpisodeSettings):
         return bool(self.progress)
 
     @property
+    def is_shaken(self) -> bool:
+        """Returns whether the arm shakes the object after the check."""
+        return bool(self.success.shake)
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Returns the task script."""
         return (Path(self.task),) if self.task else ()

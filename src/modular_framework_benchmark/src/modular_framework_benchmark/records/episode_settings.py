@@ -111,6 +111,11 @@ class EpisodeSettings:
         return False
 
     @property
+    def is_shaken(self) -> bool:
+        """Returns whether the arm shakes the object at the end of the episode, which gives the episode a hold time."""
+        return False
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Returns the named files whose content determines the episode, without scene and problem."""
         return ()
