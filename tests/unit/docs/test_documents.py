@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from modular_framework_core.files.default_folders import framework_home
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import loads
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.task_builder import TaskBuilder
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
+from modular_framework_planning.numba_cache import cache_folder
 
 ROOT = Path(__file__).parents[3]
 STATES = ROOT / "src/modular_framework_states/src/modular_framework_states/states"
@@ -88,6 +90,19 @@ def test_every_usual_change_touches_at_most_three_files() -> None:
     assert len(changes) == 15
     assert all(PATH.search(text) for text in changes.values())
     assert not [name for name, text in changes.items() if re.search(r"^4\.", text, re.MULTILINE)]
+
+
+def test_the_page_on_installation_names_all_folders_outside_the_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("XDG_CACHE_HOME", "ROS_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    folders = [framework_home(), cache_folder().parent, Path.home() / ".ros/log"]
+    page = (ROOT / "docs/installation.md").read_text()
+    assert not [folder for folder in folders if f"| `~/{folder.relative_to(Path.home())}` |" not in page]
+
+
+def test_pages_agree_on_the_disk_space() -> None:
+    (amount,) = re.findall(r"^\| disk \| ([\d.]+ GB) ", (ROOT / "docs/installation.md").read_text(), re.MULTILINE)
+    assert f"needs {amount} of disk space" in (ROOT / "README.md").read_text()
 
 
 def test_the_task_of_the_first_lesson_is_in_order() -> None:
