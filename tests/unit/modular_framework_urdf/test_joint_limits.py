@@ -22,7 +22,6 @@ SAFETY = '<safety_controller k_velocity="1" soft_lower_limit="-3" soft_upper_lim
         ({}, (-1.0, 1.0, 2.0, 1.0)),
         ({"has_velocity_limits": True, "max_velocity": 0.5}, (-1.0, 1.0, 0.5, 1.0)),
         ({"max_velocity": 3.0, "max_acceleration": 7.0}, (-1.0, 1.0, 3.0, 7.0)),
-        ({"has_velocity_limits": False, "max_velocity": 3.0}, (-1.0, 1.0, 2.0, 1.0)),
         ({"has_position_limits": True, "min_position": -2.0, "max_position": 0.5}, (-2.0, 0.5, 2.0, 1.0)),
         ({"has_position_limits": True, "max_position": 1.5}, (-1.0, 1.5, 2.0, 1.0)),
         ({"min_position": -0.5, "max_position": 0.5}, (-1.0, 1.0, 2.0, 1.0)),
@@ -34,6 +33,13 @@ def test_an_entry_overwrites_in_both_directions(entry: dict[str, Any], expected:
     assert (limits.lower, limits.upper, limits.velocity, limits.acceleration) == expected
     looser = expected[0] < -1.0 or expected[1] > 1.0 or expected[2] > 2.0
     assert bool(notes) == looser and all("looser than the URDF's" in note for note in notes)
+
+
+def test_a_velocity_limit_that_is_switched_off_is_the_default_of_a_joint_without_limit() -> None:
+    """As in MoveIt 1: RobotModelLoader removes the URDF's limit, and joints without a limit are timed with 1 rad/s."""
+    limits, (note,) = overwritten("j", DESCRIBED, {"has_velocity_limits": False, "max_velocity": 3.0})
+    assert limits.velocity == 1.0
+    assert note == "joint_limits/j: has_velocity_limits is false, so that the default 1 replaces the URDF's 2"
 
 
 def test_a_continuous_joint_gets_no_bounds() -> None:

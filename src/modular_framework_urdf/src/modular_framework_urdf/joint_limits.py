@@ -74,7 +74,8 @@ def overwritten(
         name: Joint name, for error messages.
         limits: Limits in the URDF.
         entry: Entry of joint_limits.yaml. Position limits require `has_position_limits`; other limits apply unless
-            their flag is false.
+            their flag is false. A false `has_velocity_limits` also removes the URDF's limit, as in MoveIt's
+            RobotModelLoader.
         is_endless: Whether the joint is continuous and cannot have position limits.
 
     Raises:
@@ -87,6 +88,9 @@ def overwritten(
         _value(name, entry, entry.get(f"has_{kind}_limits", True), f"max_{kind}")
         for kind in ("velocity", "acceleration", "jerk")
     )
+    has_velocity = bool(entry.get("has_velocity_limits", True))
+    if not has_velocity:
+        velocity = DEFAULT_VELOCITY
     braking_flag = "has_deceleration_limits" if "has_deceleration_limits" in entry else "has_deceleration"
     deceleration = _value(name, entry, entry.get(braking_flag, True), "max_deceleration")
     if deceleration is not None and deceleration >= 0:
@@ -113,11 +117,16 @@ def overwritten(
                 "max_velocity",
                 result.velocity,
                 limits.velocity,
-                result.velocity > limits.velocity * (1.0 + ROUNDING_TOLERANCE),
+                has_velocity and result.velocity > limits.velocity * (1.0 + ROUNDING_TOLERANCE),
             ),
         )
         if is_looser
     ]
+    if not has_velocity and limits.velocity != DEFAULT_VELOCITY:
+        notes.append(
+            f"joint_limits/{name}: has_velocity_limits is false, so that the default {DEFAULT_VELOCITY:g} replaces the "
+            f"URDF's {limits.velocity:g}"
+        )
     if has_bounds and is_endless:
         notes.append(f"joint_limits/{name}: has_position_limits is ignored, because the joint is continuous")
     return result, tuple(notes)
