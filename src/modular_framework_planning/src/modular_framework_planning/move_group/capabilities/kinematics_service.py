@@ -37,7 +37,6 @@ from modular_framework_planning.move_group.ik_targets import (
 from modular_framework_planning.move_group.pipeline_parameters import launch_seed
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-MAX_TIMEOUT_S = 10.0
 MAX_COMPARED = 4  # collision-free solutions whose clearances are compared
 
 
@@ -90,7 +89,7 @@ class KinematicsService(MoveGroupCapability):
         constraints = constraints_from_message(
             scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, links[0]
         )
-        timeout_s = self._timeout(request)
+        timeout_s = search_time_s(request.timeout.to_sec())
         solutions = combined_solutions(targets, solvers, scene.positions, timeout_s)
         valid = [positions for positions in solutions if constraints.satisfied(positions)]
         if valid and not request.avoid_collisions:
@@ -117,14 +116,6 @@ class KinematicsService(MoveGroupCapability):
             ErrorCode.NO_IK_SOLUTION, f"all {len(valid)} of {tips} collide; nearest solution: {contacts}"
         )
 
-    @staticmethod
-    def _timeout(request: Any) -> float | None:
-        """Returns the requested timeout; None for the group's timeout, infinite if /seed is set."""
-        if launch_seed() is not None:
-            return math.inf  # attempt counts bound the search, so that results do not depend on the clock
-        requested = request.timeout.to_sec()
-        return min(requested, MAX_TIMEOUT_S) if requested > 0.0 else None
-
     def _serve_fk(self, request: Any) -> GetPositionFKResponse:
         response = GetPositionFKResponse()
         try:
@@ -146,3 +137,17 @@ class KinematicsService(MoveGroupCapability):
             return response
         response.error_code.val = ErrorCode.SUCCESS
         return response
+
+
+def search_time_s(requested_s: float) -> float | None:
+    """Returns the time that a search for a solution may take [s], as in MoveIt without a maximum.
+
+    Args:
+        requested_s: Timeout of the request [s].
+
+    Returns:
+        The time [s]; None for the group's timeout, infinite if /seed is set.
+    """
+    if launch_seed() is not None:
+        return math.inf  # attempt counts bound the search, so that results do not depend on the clock
+    return requested_s if requested_s > 0.0 else None
