@@ -98,14 +98,15 @@ class InverseKinematics:
             return None
 
     def _max_reach(self) -> float:
-        """Returns an upper bound of the distance from the first joint to the last link [m]."""
-        pin_model = self.model.pin_model
-        joint_ids = [pin_model.getJointId(name) for name in self.group.joints]
-        steps = sum(
-            float(np.linalg.norm(pin_model.jointPlacements[joint_id].translation)) for joint_id in joint_ids[1:]
-        )
-        sliding = self.group.indices[~self._is_revolute]
-        return steps + float(np.maximum(np.abs(self.model.lower), np.abs(self.model.upper))[sliding].sum())
+        """Returns an upper bound of the distance from the group's first joint to the last link [m].
+
+        The path between them includes mimic and passive joints, which are not in the group.
+        """
+        model, path = self.model, self._chain.positions.tolist()
+        path = path[path.index(int(self.group.indices[0])) :]
+        steps = sum(float(np.linalg.norm(model.pin_model.jointPlacements[joint + 1].translation)) for joint in path[1:])
+        sliding = [joint for joint in path if model.document.joint_kinds[model.joint_names[joint]] == "prismatic"]
+        return steps + float(np.maximum(np.abs(model.lower), np.abs(model.upper))[sliding].sum())
 
     def tip_offset(self, tip_link: str, positions: Array) -> Transform:
         """Returns the pose of the chain's last link in the frame of a tip link.
