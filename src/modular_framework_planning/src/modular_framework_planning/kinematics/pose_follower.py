@@ -41,15 +41,16 @@ class LinkMotion:
 
 
 class PoseFollower:
-    """Follows poses of a link with the joints of a group; not thread-safe."""
+    """Follows poses of a link, or of a frame that the link carries, with the joints of a group; not thread-safe."""
 
-    def __init__(self, solver: InverseKinematics, link: str, rest: Array) -> None:
+    def __init__(self, solver: InverseKinematics, link: str, rest: Array, carried: Transform | None = None) -> None:
         """Prepares the working memory.
 
         Args:
             solver: Kinematics solver of the group.
             link: Link at the end of the group's chain, see InverseKinematics.tip_offset.
             rest: Positions of the whole robot, for joints outside the group [rad or m].
+            carried: Pose of the moved frame in the link, such as a subframe of a held object; None for the link frame.
 
         Raises:
             PlanningError: The link does not exist or is not rigidly fixed to the end of the chain.
@@ -58,6 +59,7 @@ class PoseFollower:
         self.model: RobotModel = solver.model
         self.group: JointGroup = solver.group
         self.link = link
+        self._carried = pin.SE3.Identity() if carried is None else carried
         self._solver = solver
         self.rest = np.array(rest, dtype=float)
         self._members = frozenset(int(index) for index in self.group.indices)
@@ -76,9 +78,9 @@ class PoseFollower:
         return self.model.with_mimics(positions, self._members) if self._followers else positions
 
     def pose(self, values: Array) -> Transform:
-        """Returns the link pose in the planning frame."""
+        """Returns the pose of the moved frame in the planning frame."""
         pin.framesForwardKinematics(self.model.pin_model, self._data, self.full_positions(values))
-        return self._data.oMf[self._frame].copy()
+        return self._data.oMf[self._frame] * self._carried
 
     def _jacobian(self, positions: Array, frame: Any) -> Array:
         """Returns the link's Jacobian over the group's joints, and updates the link's placement in the data."""
@@ -96,16 +98,17 @@ class PoseFollower:
         return len(self.group.joints) > 6
 
     def solve(self, guess: Array, target: Transform, preferred: Array | None = None) -> Array:
-        """Returns joint values that bring the link to a pose.
+        """Returns joint values that bring the moved frame to a pose.
 
         Args:
             guess: Expected joint values; a solution farther away than MAX_JUMP is a jump.
-            target: Target pose in the planning frame.
+            target: Target pose of the moved frame in the planning frame.
             preferred: Preferred posture of a redundant arm; None for the guess.
 
         Raises:
             PlanningError: NO_IK_SOLUTION, with the joint that would jump or leave its bounds, or with the reason.
         """
+        target = target * self._carried.inverse()
         values = self._newton(preferred if preferred is not None and self.is_redundant else guess, target)
         if values is None:
             values = self._nearest_solution(guess, target)
@@ -147,19 +150,29 @@ class PoseFollower:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, self._solver.explain_unreachable(self.link, target, seed))
         return np.asarray(solutions[0][self.group.indices], dtype=float)
 
+    def _link_motion(self, motion: LinkMotion) -> LinkMotion:
+        """Returns the motion of the link's origin, from the motion of the moved frame and the placement in the data."""
+        lever = self._data.oMf[self._frame].rotation @ self._carried.translation
+        angular, angular_rate = motion.velocity[3:], motion.acceleration[3:]
+        velocity, acceleration = motion.velocity.copy(), motion.acceleration.copy()
+        velocity[:3] -= np.cross(angular, lever)
+        acceleration[:3] -= np.cross(angular_rate, lever) + np.cross(angular, np.cross(angular, lever))
+        return LinkMotion(velocity, acceleration)
+
     def joint_rates(
         self, values: Array, motion: LinkMotion, preferred: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
-        """Returns the joint velocities and accelerations of a link motion.
+        """Returns the joint velocities and accelerations of a motion.
 
         Args:
             values: Joint values.
-            motion: Velocity and acceleration of the link.
+            motion: Velocity and acceleration of the moved frame.
             preferred: Preferred joint velocities and accelerations of a redundant arm; None for zero.
         """
         model, data, positions = self.model.pin_model, self._data, self.full_positions(values)
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobian = self._jacobian(positions, world)
+        motion = self._link_motion(motion)
         inverse = np.linalg.pinv(jacobian)
         rest = np.zeros(len(values))
         preferred_velocities, preferred_accelerations = (

@@ -149,7 +149,8 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
         return ConstraintGoal(constraints)
     link = holding_link(scene, name)
     in_link = scene.frame_transform(link).actInv(scene.frame_transform(name))
-    return PoseGoal(link, constraints.pose_target(scene.positions) * in_link.inverse(), constraints)
+    target = constraints.pose_target(scene.positions) * in_link.inverse()
+    return PoseGoal(link, target, constraints, None if name == link else in_link)
 
 
 def _without_passive_joints(

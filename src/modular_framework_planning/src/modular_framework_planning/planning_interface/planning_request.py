@@ -68,11 +68,20 @@ class JointGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """Target pose of a link in the planning frame; `allowed` is the region of accepted poses."""
+    """Target pose of a link in the planning frame.
+
+    Attributes:
+        link: Name of the link.
+        target: Target pose of the link.
+        allowed: Region of accepted poses; None for the target only.
+        carried: Pose in the link of the frame that the client moves, such as a subframe of a held object; None for the
+            link's own frame.
+    """
 
     link: str
     target: Transform
     allowed: KinematicConstraints | None = None
+    carried: Transform | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.constraints.robot_frames import require_holding_link
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planning_request import AuxiliaryPoint
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
@@ -41,8 +42,8 @@ def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_c
             "has one pose: the auxiliary point",
         )
     item = constraints.position_constraints[0]
-    if item.link_name and not scene.model.has_link(item.link_name):
-        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, f"{where}: link", item.link_name, scene.model.frame_ids)
+    if item.link_name:
+        require_holding_link(scene, item.link_name, f"{where}: link")
     point = np.array([poses[0].position.x, poses[0].position.y, poses[0].position.z], dtype=float)
     if not np.isfinite(point).all():
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{where}: the point {point.tolist()} is not finite")

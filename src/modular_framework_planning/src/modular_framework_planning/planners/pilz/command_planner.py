@@ -37,11 +37,12 @@ MAX_START_VELOCITY = 0.01  # upper limit of measurement noise on the velocity of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """Goal pose of a link, and the joint values of a joint goal."""
+    """Goal pose of a frame that a link carries, and the joint values of a joint goal."""
 
     link: str
     pose: Transform
-    values: Array | None
+    values: Array | None = None
+    carried: Transform | None = None
 
 
 class CommandPlanner:
@@ -117,7 +118,7 @@ class CommandPlanner:
         limits = self._require_limits(problem.planner_id)
         solver = problem.kinematics.solver(problem.group.name)
         target = _target(problem)
-        follower = PoseFollower(solver, target.link, problem.start)
+        follower = PoseFollower(solver, target.link, problem.start, target.carried)
         path = _path(problem, follower.pose(problem.start_values), target.pose)
         return along_path(path, follower, problem.start_values, limits, settings=settings, goal=target.values)
 
@@ -145,7 +146,8 @@ def _target(problem: PlanningProblem) -> _Target:
     goal = problem.request.goals[0]
     values = np.asarray(problem.goal_states()[0])
     if isinstance(goal, PoseGoal):
-        return _Target(goal.link, goal.target, None)
+        moved = goal.target if goal.carried is None else goal.target * goal.carried
+        return _Target(goal.link, moved, carried=goal.carried)
     link = problem.group.tip_link
     follower = PoseFollower(problem.kinematics.solver(problem.group.name), link, problem.start)
     return _Target(link, follower.pose(values), values if isinstance(goal, JointGoal) else None)
