@@ -170,10 +170,38 @@ def test_a_saved_world_is_read_as_it_was_saved(tmp_path: Path) -> None:
         <link name='l'><pose>1 2 4 0 0 0</pose></link></model></state>"""
     read = world(tmp_path, text, "1.6").models[0]
     assert (read.pose.position, read.links[0].pose.position) == ((1, 2, 3), (0, 0, 1))
-    with pytest.raises(DescriptionError, match="got '2 1 1'"):
-        world(tmp_path, text.replace("1 1 1", "2 1 1"), "1.6")
+    with pytest.raises(DescriptionError, match="got '0 1 1'; allowed: numbers greater than 0"):
+        world(tmp_path, text.replace("1 1 1", "0 1 1"), "1.6")
     with pytest.raises(DescriptionError, match="adds or removes models"):
         world(tmp_path, "<state><deletions><name>a</name></deletions></state>", "1.6")
+
+
+def test_a_saved_scale_changes_shapes_and_neither_their_poses_nor_the_mass_as_in_gazebo(tmp_path: Path) -> None:
+    """The rules are those of SetScale in Gazebo 11: BoxShape, CylinderShape, SphereShape and MeshShape."""
+    (tmp_path / "m.stl").write_text("solid m\nendsolid m\n")
+    shapes = {
+        "box": "<box><size>0.1 0.2 0.3</size></box>",
+        "cylinder": "<cylinder><radius>0.1</radius><length>0.4</length></cylinder>",
+        "sphere": "<sphere><radius>0.1</radius></sphere>",
+        "mesh": f"<mesh><uri>{tmp_path / 'm.stl'}</uri><scale>0.001 0.001 0.001</scale></mesh>",
+    }
+    elements = "".join(
+        f"<{tag} name='{name}'><pose>0 0 1 0 0 0</pose><geometry>{shape}</geometry></{tag}>"
+        for tag in ("collision", "visual")
+        for name, shape in shapes.items()
+    )
+    inertial = "<inertial><mass>3</mass></inertial>"
+    text = f"""<model name='a'><link name='l'>{inertial}{elements}</link></model><state world_name='w'>
+        <model name='a'><pose>1 0 0 0 0 0</pose><scale>2 3 4</scale></model></state>"""
+    (link,) = world(tmp_path, text, "1.6").models[0].links
+    for found in (link.collisions, link.visuals):
+        box, cylinder, sphere, mesh = (each.geometry for each in found)
+        assert box == specs.Box(pytest.approx((0.2, 0.6, 1.2)))
+        assert cylinder == specs.Cylinder(pytest.approx(0.3), pytest.approx(1.6))
+        assert sphere == specs.Sphere(pytest.approx(0.4))
+        assert mesh.scale == (2.0, 3.0, 4.0)
+        assert {each.pose.position for each in found} == {(0, 0, 1)}
+    assert link.inertial.mass == 3.0
 
 
 @pytest.mark.parametrize("start", ["\n\n", "\ufeff", " ", "<!-- licence\n of two lines -->\n"])

@@ -171,9 +171,7 @@ def with_saved_state(models: list[specs.Model], state: XmlNode | None) -> list[s
 
 def _restored(model: specs.Model, saved: XmlNode) -> specs.Model:
     notes = list(model.notes)
-    pose_node, scale = saved.find("pose"), saved.find("scale")
-    if scale is not None and any(abs(value - 1) > 1e-6 for value in scale.numbers(3)):
-        raise DescriptionError(scale.where, f"got '{scale.text.strip()}'", "allowed: 1 1 1; scale the model's file")
+    pose_node = saved.find("pose")
     pose = pose_of(pose_node) if pose_node is not None else model.pose
     link_poses = {node.attributes.get("name", ""): node.find("pose") for node in saved.find_all("link")}
     moved: dict[str, Pose] = {}
@@ -188,5 +186,45 @@ def _restored(model: specs.Model, saved: XmlNode) -> specs.Model:
     if moved and model.joints:
         notes.append(f"{saved.where}: the saved joint positions have no effect; the joints start at 0")
         moved = {}
-    links = tuple(dataclasses.replace(link, pose=moved.get(link.name, link.pose)) for link in model.links)
+    scale = _saved_scale(saved)
+    links = tuple(
+        dataclasses.replace(_scaled_link(link, scale), pose=moved.get(link.name, link.pose)) for link in model.links
+    )
     return dataclasses.replace(model, pose=pose, links=links, notes=tuple(notes))
+
+
+def _saved_scale(saved: XmlNode) -> Vector3:
+    node = saved.find("scale")
+    x, y, z = node.numbers(3) if node is not None else (1.0, 1.0, 1.0)
+    if node is not None and min(x, y, z) <= 0.0:
+        raise DescriptionError(node.where, f"got '{node.text.strip()}'", "allowed: numbers greater than 0")
+    return x, y, z
+
+
+def _scaled_link(link: specs.Link, scale: Vector3) -> specs.Link:
+    """Returns a link whose shapes are scaled as Model::SetScale of Gazebo does: their poses and the mass do not change.
+
+    Args:
+        link: Link of the model.
+        scale: Factors along the axes of each shape.
+    """
+    if all(abs(factor - 1.0) <= 1e-6 for factor in scale):
+        return link
+    collisions = (dataclasses.replace(one, geometry=_scaled(one.geometry, scale)) for one in link.collisions)
+    visuals = (dataclasses.replace(one, geometry=_scaled(one.geometry, scale)) for one in link.visuals)
+    return dataclasses.replace(link, collisions=tuple(collisions), visuals=tuple(visuals))
+
+
+def _scaled(geometry: specs.Geometry, scale: Vector3) -> specs.Geometry:
+    x, y, z = scale
+    match geometry:
+        case specs.Box(size=(along_x, along_y, along_z)):
+            return specs.Box((along_x * x, along_y * y, along_z * z))
+        case specs.Cylinder(radius=radius, length=length):
+            return specs.Cylinder(radius * max(x, y), length * z)
+        case specs.Sphere(radius=radius):
+            return specs.Sphere(radius * max(scale))
+        case specs.Mesh():
+            return dataclasses.replace(geometry, scale=scale)  # the file's own scale has no effect then, as in Gazebo
+        case specs.Plane():
+            return geometry
