@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ import rospkg
 
 from modular_framework_core.launching.launch_arguments import check_arguments
 from modular_framework_core.launching.launch_runner import EXIT_BAD_LAUNCH, LaunchSpec, run_launch
+from modular_framework_core.launching.ros_argument_check import unknown_arguments
 
 API = "modular_framework_api"
 
@@ -105,6 +107,30 @@ def test_roslaunch_prints_the_sentence_before_its_own_error(
     fault, note = capfd.readouterr().err.splitlines()
     assert fault.startswith(sentence)
     assert note.startswith("Nothing was started.")
+
+
+@pytest.mark.parametrize("argument", ["controller_file", "connection_file"])
+def test_a_broken_file_of_controllers_or_hardware_is_named_with_its_line(
+    start: str, tmp_path: Path, argument: str
+) -> None:
+    (tmp_path / "broken.yaml").write_text("arm:\n  type: [a\n")
+    file = f"{'../' * 20}{tmp_path}/broken.yaml"
+    with pytest.raises(roslaunch.core.RLException, match=f"argument '{argument}' .*broken.yaml:3: not valid YAML"):
+        check_arguments(start, ["simulation:=false", f"{argument}:={file}"])
+
+
+def test_plain_roslaunch_refuses_a_misspelt_argument_before_any_node(start: str) -> None:
+    for words in ([start], [API, "start_framework.launch"]):
+        command = ["roslaunch", *words, "--dump-params", "wrld_file:=bin.world", "gui:=false"]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        fault, note = ended.stderr.splitlines()[:2]
+        assert fault.startswith("unknown argument 'wrld_file'; did you mean 'world_file'?; allowed: ")
+        assert note.startswith("Nothing was started.")
+
+
+@pytest.mark.parametrize("command", [["python3", "/usr/bin/rostest"], ["python3", "/usr/bin/roslaunch", "nothing"]])
+def test_other_programs_and_launch_files_that_do_not_exist_are_left_to_themselves(command: list[str]) -> None:
+    assert not list(unknown_arguments([*command, "no.launch", "wrld_file:=bin.world"]))
 
 
 def test_a_robot_that_xacro_cannot_expand_ends_with_one_sentence(

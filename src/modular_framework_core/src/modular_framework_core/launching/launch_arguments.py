@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 import roslaunch.arg_dump
@@ -70,6 +70,16 @@ def _files_with_all_arguments(path: str) -> list[str]:
     ]
 
 
+def unknown_argument(name: str, known: Collection[str]) -> str:
+    """Returns the fault of an argument that the launch file does not have.
+
+    Args:
+        name: Name of the argument.
+        known: Names of the launch file's arguments.
+    """
+    return f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}"
+
+
 def check_arguments(
     path: str, arguments: list[str], faults_of: Callable[[Mapping[str, str]], list[str]] = value_faults
 ) -> None:
@@ -92,7 +102,7 @@ def check_arguments(
             hint = f"; did you mean '{start}:={end}'" if sign and start in known else ""
             faults.append(f"argument '{argument}' is not of the form name:=value{hint}")
         elif name not in known:
-            faults.append(f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}")
+            faults.append(unknown_argument(name, known))
         elif ":=" in value:
             faults.append(
                 f"argument '{name}' is '{value}'; roslaunch does not support values with ':='; make it the default of "

@@ -6,7 +6,6 @@ roslaunch reports such faults one node at a time, without the argument and the a
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -41,7 +40,6 @@ CONFIGURATION_FILES = (
 NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
 """Optional files of the configuration folder."""
 SCRIPT, MACHINE = "task_constructor_script", "state_machine_to_load"
-ROSLAUNCH_NOTE = "Nothing was started. The error of roslaunch that follows only says that this check failed."
 
 
 def value_faults(values: Mapping[str, str]) -> list[str]:
@@ -66,16 +64,6 @@ def file_faults(values: Mapping[str, str]) -> list[str]:
         *_generated_name_faults(values),
     ]
     return [*faults, *(_package_faults(values) if "robot_package" in values else ())]
-
-
-def main(arguments: list[str]) -> int:
-    """Prints the faults in `NAME:=VALUE ...` and returns 1 if there are any, which makes roslaunch stop."""
-    faults = value_faults(dict(argument.split(":=", 1) for argument in arguments))
-    for fault in faults:
-        print(fault, file=sys.stderr)
-    if faults:
-        print(ROSLAUNCH_NOTE, file=sys.stderr)
-    return 1 if faults else 0
 
 
 def _truth_faults(values: Mapping[str, str]) -> Iterator[str]:
@@ -128,6 +116,8 @@ def _file_faults(argument: str, folder: Path, name: str) -> Iterator[str]:
         file_names = sorted(entry.name for entry in folder.glob("*") if entry.is_file())
         allowed = listing(file_names, "the folder is empty")
         yield f"argument '{argument}' is '{name}', and {folder} has no such file; {allowed}{nearest(name, file_names)}"
+    elif path.suffix in (".yaml", ".yml"):
+        yield from (f"argument '{argument}' is '{name}': {fault}" for fault in _yaml_faults(path))
     elif path.suffix in (".world", ".xacro", ".urdf"):
         try:
             xml_text.read(path)
@@ -180,15 +170,20 @@ def _folder_faults(values: Mapping[str, str]) -> Iterator[str]:
         except TaskFault as error:
             yield f"argument '{CONFIGURATION}' is '{value}': {error.faults[0]}"
     for name in NAMES_FILES if "robot_package" in values else ():
-        try:
-            shallow_yaml.load(read_text(folder / name))
-        except FileNotFoundError:
-            continue
-        except yaml.MarkedYAMLError as error:
-            line = error.problem_mark.line + 1 if error.problem_mark else 1
-            yield f"argument '{CONFIGURATION}' is '{value}': {folder / name}:{line}: not valid YAML: {error.problem}"
-        except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-            yield f"argument '{CONFIGURATION}' is '{value}': {folder / name}: {error}"
+        yield from (f"argument '{CONFIGURATION}' is '{value}': {fault}" for fault in _yaml_faults(folder / name))
+
+
+def _yaml_faults(path: Path) -> Iterator[str]:
+    """Yields the fault of a file that is not valid YAML; a missing file is no fault."""
+    try:
+        shallow_yaml.load(read_text(path))
+    except FileNotFoundError:
+        return
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        yield f"{path}:{line}: not valid YAML: {error.problem}"
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        yield f"{path}: {error}"
 
 
 def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
@@ -214,7 +209,3 @@ def _path_hint(path: Path) -> str:
     """Returns a hint with the most similar path in the same folder, or ""."""
     siblings = [str(entry) for entry in path.parent.iterdir()] if path.is_absolute() and path.parent.is_dir() else []
     return nearest(str(path), siblings)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
