@@ -22,6 +22,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 POSE_TOLERANCE = 1.0e-9  # tolerance of the pose error norm [m and rad]
 ACCEPTED_ERROR = 1.0e-7  # accepted error if rounding prevents convergence to POSE_TOLERANCE
 NEWTON_STEPS = 25
+MIN_DAMPING = 1.0e-12  # keeps the matrix of an arm with fewer than six joints regular
 MAX_JUMP = 0.3  # maximum difference between a guess and its solution [rad or m]
 MAX_TRAVEL = 1.5  # larger joint displacements count as divergence of Newton's method [rad or m]
 BOUND_TOLERANCE = 1.0e-6
@@ -136,7 +137,7 @@ class PoseFollower:
             size = float(np.linalg.norm(error))
             if size < POSE_TOLERANCE:
                 return values
-            damping = min(1.0e-4, size * size) * np.eye(6)
+            damping = min(max(size * size, MIN_DAMPING), 1.0e-4) * np.eye(6)
             values = values + jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
             if float(np.abs(values - guess).max()) > MAX_TRAVEL:
                 return None
