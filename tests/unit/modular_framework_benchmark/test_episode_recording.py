@@ -19,6 +19,7 @@ from modular_framework_benchmark.episodes.ros_recording import (
     write_recording,
 )
 from modular_framework_benchmark.episodes.ros_samples import Samples
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_benchmark.results.lerobot_frames import ACTION, read_frames
 
 RATE = 50.0
@@ -67,9 +68,18 @@ def test_poses_are_those_of_the_simulation_and_a_model_at_rest_has_one_row(tmp_p
     moving[0] = sample(0.0, {"cube": state((0, 0, 0)), "table": state((1, 0, 0))}, [], [])
     world = {"samples": moving, "boxes": {}, "robots": []}
     answer = {"zero": 0.0, "simulated_s": 0.4, "checked_s": 0.3}
-    written = write_recording(tmp_path, samples, world, spawned={"cube": "cube"}, answer=answer, rate_hz=RATE)
+    written = write_recording(
+        tmp_path,
+        samples,
+        world,
+        spawned=(PlacedObject("cube", "cube", 0.0, 0.0, 0.0, scale=0.8),),
+        answer=answer,
+        rate_hz=RATE,
+    )
     assert written["recording_fault"] == "" and written["final"]["cube"][2] == pytest.approx(1.5)
-    objects = json.loads((tmp_path / "recording.json").read_text())["objects"]
+    recording = json.loads((tmp_path / "recording.json").read_text())
+    assert recording["spawned"] == {"cube": "cube"} and recording["scales"] == {"cube": 0.8}
+    objects = recording["objects"]
     assert objects["cube"]["time_s"] == pytest.approx([0.02 * number for number in range(20)])
     assert objects["cube"]["z"] == pytest.approx([0.1 * number for number in range(20)])
     assert objects["table"]["x"] == [1.0]
@@ -86,7 +96,7 @@ def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: py
     close.header.stamp = rospy.Time.from_sec(0.25)
     samples.set_points = [("knuckle", close)]
     answer = {"zero": 0.0, "simulated_s": 0.4}
-    write_recording(tmp_path, samples, NO_RECORD, spawned={}, answer=answer, rate_hz=None)
+    write_recording(tmp_path, samples, NO_RECORD, spawned=(), answer=answer, rate_hz=None)
     frames = read_frames(tmp_path / "trajectory.parquet", 10)
     gripper = frames.values[ACTION][:, frames.names[ACTION].index("knuckle")]
     assert gripper == pytest.approx([0.1, 0.2, 1.2, 1.2]), "the measured position before the first command"
@@ -99,6 +109,6 @@ def test_a_place_that_cannot_be_planned_is_a_failed_plan_and_a_feasible_one_is_n
     report = {"kind": "place", "time": 0.2, "reason": "place 0: reach: out of reach", "error_code": -31}
     samples.planning = [(10.2, report), (10.3, {**report, "time": 0.3, "reason": "", "error_code": 1})]
     answer = {"zero": 0.0, "simulated_s": 0.4}
-    write_recording(tmp_path, samples, NO_RECORD, spawned={}, answer=answer, rate_hz=RATE)
+    write_recording(tmp_path, samples, NO_RECORD, spawned=(), answer=answer, rate_hz=RATE)
     (found,) = json.loads((tmp_path / "recording.json").read_text())["reports"]
     assert (found["component"], found["succeeded"], found["figures"]["error_code"]) == ("planning", False, -31)

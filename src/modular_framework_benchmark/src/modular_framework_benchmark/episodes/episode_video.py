@@ -30,6 +30,7 @@ from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_model_text, read_world
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.body_urdf import model_to_urdf
@@ -77,7 +78,7 @@ class RecordedScene:
         self._build_world(str(simulation.get("world_file", "")))
         for name, model in recording.get("spawned", {}).items():
             file = model_file(model, models)
-            text = file.read_text()
+            text = read_scaled(file, recording.get("scales", {}).get(name))
             self._spawn(replace(read_model_text(text, str(file), self._resources), name=name))
         description = read_robot(
             str(parameters.get("robot_description", "")), self._resources.find_package, self._parts, with_visuals=True

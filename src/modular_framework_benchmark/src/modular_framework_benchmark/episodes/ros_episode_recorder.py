@@ -142,9 +142,10 @@ class EpisodeRecorder:
                 answer["foul"] = str(error)
                 if not self._samples.ends:
                     self._stop_task()
-            spawned = {placed.name: placed.model for placed in request.objects}
             world = end_world_record(must_answer=not {"aborted", "foul"} & set(answer))
-            answer |= write_recording(folder, self._samples, world, spawned=spawned, answer=answer, rate_hz=rate_hz)
+            answer |= write_recording(
+                folder, self._samples, world, spawned=request.objects, answer=answer, rate_hz=rate_hz
+            )
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]

@@ -24,6 +24,7 @@ from modular_framework_benchmark.metrics.recording_files import (
     WORLD_RECORD,
 )
 from modular_framework_benchmark.predicates.world_track import read_world
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_ros.reported_figures import (
     ATTEMPTS,
     CLEARANCE,
@@ -45,7 +46,7 @@ def write_recording(
     samples: Samples,
     world: Mapping[str, Any],
     *,
-    spawned: Mapping[str, str],
+    spawned: Sequence[PlacedObject],
     answer: Mapping[str, Any],
     rate_hz: float | None,
 ) -> dict[str, Any]:
@@ -55,7 +56,7 @@ def write_recording(
         folder: Folder of the files.
         samples: Collected messages.
         world: Record of the world by the simulation.
-        spawned: Models of the spawned objects, keyed by object name.
+        spawned: Spawned objects.
         answer: `origin_s`: ROS time at the start of the recording [s]; `checked_s`, `simulated_s`: time of the success
             check and of the end [s since the start of the recording].
         rate_hz: Publish rate of the joint states while simulated time passes [Hz]; None to keep all messages, see
@@ -78,7 +79,8 @@ def write_recording(
     tracking.to_parquet(folder / TRACKING)
     content = {
         "objects": {name: rows.to_dict("list") for name, rows in poses.items()},
-        "spawned": dict(spawned),
+        "spawned": {placed.name: placed.model for placed in spawned},
+        "scales": {placed.name: placed.scale for placed in spawned if placed.scale is not None},
         "reports": [*_planning(samples, origin_s), *_actions(samples, origin_s), *_components(samples, origin_s)],
     }
     (folder / RECORDING).write_text(json.dumps(content))

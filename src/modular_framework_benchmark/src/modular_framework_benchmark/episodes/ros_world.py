@@ -16,6 +16,8 @@ from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
 from modular_framework_benchmark.records.episode_settings import PlacedObject, model_file
 from modular_framework_ros.calls import CallError, request_service
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE = (
@@ -45,7 +47,7 @@ def spawn(placed: PlacedObject) -> None:
     """
     x, y, z, w = quaternion_from_rpy(*placed.rpy)
     pose = Pose(Point(*placed.xyz), Quaternion(x, y, z, w))
-    request = SpawnModel._request_class(placed.name, _description(placed.model), "", pose, "world")
+    request = SpawnModel._request_class(placed.name, _description(placed), "", pose, "world")
     response = request_service(SPAWN_SERVICE, SpawnModel, request, SERVICE_TIMEOUT_S)
     if not response.success:
         raise WorldError(f"object '{placed.name}' cannot be spawned: {response.status_message}")
@@ -136,9 +138,9 @@ def _ask_simulation(service: str, kind: Any, request: Any, timeout_s: float) -> 
     return str(response.message)
 
 
-def _description(model: str) -> str:
-    path = model_file(model, str(rospy.get_param("/gazebo_model_path", "")))
+def _description(placed: PlacedObject) -> str:
+    path = model_file(placed.model, str(rospy.get_param("/gazebo_model_path", "")))
     try:
-        return path.read_text()
-    except OSError as error:
-        raise WorldError(f"model '{model}': {path} cannot be read: {error.strerror}; correct the name") from error
+        return read_scaled(path, placed.scale)
+    except (OSError, DescriptionError) as error:
+        raise WorldError(f"model '{placed.model}': {path} cannot be used: {error}; correct the name") from error

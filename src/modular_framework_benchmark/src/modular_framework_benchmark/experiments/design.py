@@ -13,6 +13,7 @@ from typing import Any
 from modular_framework_benchmark.experiments.distributions import generator_of
 from modular_framework_benchmark.experiments.experiment import Combination, Experiment
 from modular_framework_benchmark.experiments.reading import MAX_SEED
+from modular_framework_benchmark.experiments.scene_objects import sampled_scene
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json
 
@@ -22,6 +23,8 @@ DRAWN_SETTINGS = ("objects", "problem")
 
 def plan_episodes(experiment: Experiment) -> list[EpisodeSpec]:
     """Returns the episodes in the order of their execution.
+
+    Raises ExperimentFault if the objects of a trial do not fit into their ranges.
 
     The order goes through the trials, or through blocks of trials. Within a block, episodes that can share a running
     stack are adjacent. The order of these groups and of the episodes within them is random, seeded by the experiment.
@@ -73,7 +76,7 @@ def _drawn(experiment: Experiment, combination: Combination, pair_key: str, tria
     """Returns the settings of one episode, with its scene or problem."""
     key, drawn = (experiment.seed, pair_key, trial), dict[str, Any]()
     if combination.objects:
-        drawn["objects"] = tuple(item.sampled(key, index) for index, item in enumerate(combination.objects))
+        drawn["objects"] = sampled_scene(combination.objects, key)
     if combination.problems:
         drawn["problem"] = combination.problems[trial % len(combination.problems)]
     return replace(

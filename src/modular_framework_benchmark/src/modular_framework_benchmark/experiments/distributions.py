@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import random
 from dataclasses import dataclass
 
@@ -20,6 +21,16 @@ class Fixed:
     """A constant."""
 
     value: float
+
+    @property
+    def low(self) -> float:
+        """Returns the smallest number."""
+        return self.value
+
+    @property
+    def high(self) -> float:
+        """Returns the largest number."""
+        return self.value
 
     def draw(self, generator: random.Random) -> float:
         """Returns the constant."""
@@ -45,6 +56,16 @@ class Normal:
     mean: float
     deviation: float
 
+    @property
+    def low(self) -> float:
+        """Returns the smallest number."""
+        return -math.inf
+
+    @property
+    def high(self) -> float:
+        """Returns the largest number."""
+        return math.inf
+
     def draw(self, generator: random.Random) -> float:
         """Returns a normally distributed number."""
         return round(generator.gauss(self.mean, self.deviation), DIGITS)
@@ -55,6 +76,16 @@ class Choice:
     """A uniform choice among given numbers."""
 
     values: tuple[float, ...]
+
+    @property
+    def low(self) -> float:
+        """Returns the smallest number."""
+        return min(self.values)
+
+    @property
+    def high(self) -> float:
+        """Returns the largest number."""
+        return max(self.values)
 
     def draw(self, generator: random.Random) -> float:
         """Returns one of the numbers."""

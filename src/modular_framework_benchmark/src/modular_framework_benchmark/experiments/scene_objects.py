@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Map
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.distributions import (
@@ -15,24 +16,25 @@ from modular_framework_benchmark.experiments.distributions import (
     generator_of,
     read_distribution,
 )
-from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.experiments.model_sizes import longest_side, lowest_point, resting_height, sides
+from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.records.episode_settings import PlacedObject
+from modular_framework_core.files.faults import Fault
 from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
 from modular_framework_core.files.located_yaml import Sequence as ListNode
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, renamed_key
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.models.model_extents import reach
-from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.sdf_reader import read_model_text
-from modular_framework_simulation.models.sdf_resources import Resources, no_packages
-from modular_framework_urdf.rotations import rotate_vector
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 SURFACE, OLD_SURFACE = "rests_at", "on"
 """Key of the surface height, and its former name, which PyYAML reads and writes as true."""
-KEYS = ("model", "name", *POSE_KEYS, SURFACE)
+COUNT, SIZE, SPACING = "count", "size", "spacing"
+KEYS = ("model", "name", *POSE_KEYS, SURFACE, COUNT, SIZE, SPACING)
+MAX_COUNT, MAX_SIZE_M, MAX_SPACING_M = 50, 2.0, 10.0
+MAX_DRAWS, MAX_SCENES = 200, 5
+"""Maximum number of poses drawn for an object, and of scenes begun, before objects count as too many for their
+ranges."""
 EXAMPLE = "{model: cube, x: [-0.2, 0.2], y: 0.5, rests_at: 0.84}"
 
 
@@ -47,6 +49,9 @@ class SceneObject:
         pose: Distributions of x, y, z [m] and roll, pitch, yaw [rad] in the world frame; without z the object rests on
             a surface.
         surface: Distribution of the surface height [m]; None if z is given.
+        size: Distribution of the length of the longest side [m]; None for the model as it is.
+        spacing_m: Smallest horizontal distance between the object's frame and the frames of the objects before it [m].
+        node: Mapping of the file, for faults.
     """
 
     name: str
@@ -54,21 +59,73 @@ class SceneObject:
     file: Path
     pose: dict[str, Distribution]
     surface: Distribution | None
+    size: Distribution | None = None
+    spacing_m: float = 0.0
+    node: Mapping | None = field(default=None, compare=False, repr=False)
 
-    def sampled(self, key: tuple[object, ...], index: int) -> PlacedObject:
-        """Returns the object with the pose drawn for a trial.
+    def sampled(self, key: tuple[object, ...], index: int, draw: int = 0) -> PlacedObject:
+        """Returns the object with the pose and the size drawn for a trial.
 
         Args:
             key: Key of the random generator: the experiment's seed, the trial, ...
             index: Index of the object in the list.
+            draw: Index of the draw, if earlier draws were too near to other objects.
         """
-        numbers = {
-            name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, "objects", index, name)) for name in POSE_KEYS
-        }
+        key = (*key, "objects", index, *((draw,) if draw else ()))
+        numbers = {name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, name)) for name in POSE_KEYS}
+        scale = None
+        if self.size is not None:
+            scale = round(self.size.draw(generator_of(*key, SIZE)) / longest_side(self.file), 6)
         if self.surface is not None:
-            surface = self.surface.draw(generator_of(*key, "objects", index, OLD_SURFACE))
-            numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"])
-        return PlacedObject(self.name, self.model, **numbers)
+            surface = self.surface.draw(generator_of(*key, OLD_SURFACE))
+            numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"], scale or 1.0)
+        return PlacedObject(self.name, self.model, scale=scale, **numbers)
+
+    def is_clear_of(self, placed: PlacedObject, others: Sequence[PlacedObject]) -> bool:
+        """Returns whether the object keeps its spacing.
+
+        Args:
+            placed: The object at its pose.
+            others: Objects before it.
+        """
+        return all(math.hypot(placed.x - other.x, placed.y - other.y) >= self.spacing_m for other in others)
+
+
+def sampled_scene(objects: Sequence[SceneObject], key: tuple[object, ...]) -> tuple[PlacedObject, ...]:
+    """Returns the objects of a trial with their poses.
+
+    A pose that is too near to the objects before it is drawn again. If no pose is found, the scene begins anew.
+
+    Args:
+        objects: Objects in their order.
+        key: Key of the random generator: the experiment's seed, the trial, ...
+
+    Raises:
+        ExperimentFault: The objects do not fit into their ranges.
+    """
+    failed = objects[0] if objects else None
+    for scene in range(MAX_SCENES):
+        placed: list[PlacedObject] = []
+        for index, item in enumerate(objects):
+            draws = (item.sampled(key, index, scene * MAX_DRAWS + draw) for draw in range(MAX_DRAWS))
+            found = next((drawn for drawn in draws if item.is_clear_of(drawn, placed)), None)
+            if found is None:
+                failed = item
+                break
+            placed.append(found)
+        else:
+            return tuple(placed)
+    assert failed is not None and failed.node is not None
+    raise ExperimentFault([Fault(failed.node.location, _crowded(failed, objects))])
+
+
+def _crowded(failed: SceneObject, objects: Sequence[SceneObject]) -> str:
+    before = list(itertools.takewhile(lambda item: item is not failed, objects))
+    return (
+        f"object '{failed.name}' does not fit: no pose in {MAX_DRAWS * MAX_SCENES} draws is {failed.spacing_m:g} m "
+        f"from the {len(before)} objects before it; choose wider ranges of x and y, a smaller {SPACING}, or fewer "
+        "objects"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +138,9 @@ class ObjectNodes:
         name: Name of the object; None to derive it from the model.
         pose: See `SceneObject`.
         surface: See `SceneObject`.
+        size: See `SceneObject`.
+        spacing_m: See `SceneObject`.
+        count: Number of objects, named NAME_1, NAME_2, ...; None for one object of the given name.
     """
 
     node: Mapping
@@ -88,6 +148,9 @@ class ObjectNodes:
     name: str | None
     pose: dict[str, Distribution]
     surface: Distribution | None
+    size: Distribution | None = None
+    spacing_m: float = 0.0
+    count: int | None = None
 
 
 def read_objects(reading: Reading, node: Node, key: str) -> list[ObjectNodes] | None:
@@ -124,35 +187,86 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
         for key in POSE_KEYS
         if key in node.entries and (sampled := read_distribution(node.entries[key], key, reading)) is not None
     }
-    surface = read_distribution(node.entries[SURFACE], SURFACE, reading) if SURFACE in node.entries else None
+    surface, size = (
+        read_distribution(node.entries[key], key, reading) if key in node.entries else None for key in (SURFACE, SIZE)
+    )
+    if size is not None and not 0.0 < size.low <= size.high <= MAX_SIZE_M:
+        text = f"size is {size.low:g} to {size.high:g} m; allowed: more than 0, up to {MAX_SIZE_M:g} m"
+        reading.faults.add(node.entries[SIZE].location, text)
+        size = None
+    spacing = reading.number(node.entries[SPACING], SPACING, 0.0, MAX_SPACING_M) if SPACING in node.entries else 0.0
+    count = reading.count(node.entries[COUNT], COUNT, 1, MAX_COUNT) if COUNT in node.entries else None
     model = reading.text(node.entries["model"], "model")
     name = reading.name(node.entries["name"], "name") if "name" in node.entries else None
-    return None if model is None else ObjectNodes(node, model, name, pose, surface)
+    if model is None or spacing is None or (count is None and COUNT in node.entries):
+        return None
+    return ObjectNodes(node, model, name, pose, surface, size, spacing, count)
 
 
-def _named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:
-    """Returns an object with its model's file; adds a fault if another object has the same name.
+def _named_objects(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> list[SceneObject]:
+    """Returns objects with their model's file; adds a fault if another object has the same name.
 
     Args:
-        found: Object of the experiment file.
+        found: Objects of one model in the experiment file.
         file: SDF file of the model.
-        taken: Names of the previous objects; the object's name is added.
+        taken: Names of the previous objects; the names of the objects are added.
         reading: Reader that collects faults.
     """
-    name = found.name or next(
-        free for number in range(1, len(taken) + 2) if (free := f"{file.parent.name}_{number}") not in taken
-    )
-    if name in taken:
-        location = found.node.entries["name"].location
-        reading.faults.add(location, f"two objects have the name '{name}'; rename one of them")
-    taken.add(name)
-    if found.surface is not None:
-        try:
-            lowest_point(file, 0.0, 0.0)
-        except DescriptionError as error:
-            reading.faults.add(found.node.entries[SURFACE].location, f"the model has no lowest point: {error}")
+    base = found.name or file.parent.name
+    if found.count is not None:
+        names = [f"{base}_{number}" for number in range(1, found.count + 1)]
+    elif found.name:
+        names = [found.name]
+    else:
+        numbered = (f"{base}_{number}" for number in range(1, len(taken) + 2))
+        names = [next(free for free in numbered if free not in taken)]
+    if same := taken.intersection(names):
+        location = found.node.entries.get("name", found.node).location
+        reading.faults.add(location, f"two objects have the name '{min(same)}'; rename one of them")
+    taken.update(names)
+    _check_model(found, file, reading)
     is_path = "/" in found.model or found.model.endswith(".sdf")
-    return SceneObject(name, str(file) if is_path else found.model, file, found.pose, found.surface)
+    return [
+        SceneObject(
+            name,
+            str(file) if is_path else found.model,
+            file,
+            found.pose,
+            found.surface,
+            found.size,
+            found.spacing_m,
+            found.node,
+        )
+        for name in names
+    ]
+
+
+def _check_model(found: ObjectNodes, file: Path, reading: Reading) -> None:
+    """Adds a fault if the model cannot rest on a surface, have a size, or stand beside others of its kind."""
+    checks: dict[str, Callable[[], object]] = {
+        SURFACE: lambda: lowest_point(file, 0.0, 0.0),
+        SIZE: lambda: longest_side(file),
+        COUNT: lambda: _check_spacing(found, file, reading),
+    }
+    for key, check in checks.items():
+        if key in found.node.entries:
+            try:
+                check()
+            except DescriptionError as error:
+                what = {SURFACE: "has no lowest point", SIZE: "cannot have a size"}.get(key, "has no extent")
+                reading.faults.add(found.node.entries[key].location, f"the model {what}: {error}")
+
+
+def _check_spacing(found: ObjectNodes, file: Path, reading: Reading) -> None:
+    """Adds a fault if several objects of a model could overlap."""
+    scale = found.size.high / longest_side(file) if found.size is not None else 1.0
+    diagonal = scale * math.hypot(*sides(file)[:2])
+    if found.count is not None and found.count > 1 and found.spacing_m < diagonal:
+        reading.faults.add(
+            found.node.entries.get(SPACING, found.node).location,
+            f"{found.count} objects with a {SPACING} of {found.spacing_m:g} m could overlap; allowed: at least the "
+            f"diagonal of the model, {diagonal:.3f} m",
+        )
 
 
 def placed_objects(
@@ -167,64 +281,19 @@ def placed_objects(
         reading: Reader that collects faults.
     """
     taken: set[str] = set()
-    objects = []
+    objects: list[SceneObject] = []
+    before = len(reading.faults)
     for item in nodes:
         try:
             file = reading.resources.model(item.model, launch, arguments, reading.folder)
         except UnresolvedReference as error:
             reading.faults.add(item.node.entries["model"].location, str(error))
             continue
-        objects.append(_named_object(item, file, taken, reading))
+        objects += _named_objects(item, file, taken, reading)
+    if len(reading.faults) == before and any(item.spacing_m for item in nodes):
+        try:
+            sampled_scene(objects, ("check",))
+        except ExperimentFault as error:
+            for fault in error.faults:
+                reading.faults.add(fault.location, fault.message)
     return objects
-
-
-GAP_M = 0.001
-"""Clearance between an object and its surface, so that they are not in contact at the start [m]."""
-
-
-def resting_height(model: Path, surface_m: float, roll_rad: float, pitch_rad: float) -> float:
-    """Returns the height of the model frame at which the model stands on a surface [m].
-
-    Args:
-        model: SDF file of the model.
-        surface_m: Height of the horizontal surface [m].
-        roll_rad: Roll angle of the model [rad].
-        pitch_rad: Pitch angle of the model [rad].
-
-    Raises:
-        DescriptionError: The file is invalid, or has no collision shape.
-    """
-    return round(surface_m + GAP_M - lowest_point(model, roll_rad, pitch_rad), 6)
-
-
-@lru_cache(maxsize=4096)
-def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
-    """Returns the height of the lowest point of a model's collision shapes relative to its frame [m].
-
-    Args:
-        model: SDF file of the model.
-        roll_rad: Roll angle of the model [rad].
-        pitch_rad: Pitch angle of the model [rad].
-
-    Raises:
-        DescriptionError: See `resting_height`.
-    """
-    spec = _read(model)
-    shapes = [collision.geometry for link in spec.links for collision in link.collisions]
-    if not shapes:
-        raise DescriptionError(str(model), "got no <collision>", "allowed: a model with one; give z instead of on")
-    if any(isinstance(shape, specs.Plane) for shape in shapes):
-        raise DescriptionError("<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on")
-    to_model = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0)).inverse()
-    return -reach(spec, rotate_vector(to_model.quaternion, (0.0, 0.0, -1.0)))
-
-
-@lru_cache(maxsize=64)
-def _read(model: Path) -> specs.Model:
-    try:
-        text = model.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(
-            str(model), f"got a file that cannot be read ({error})", "allowed: an SDF file"
-        ) from error
-    return read_model_text(text, str(model), Resources((model.parent.parent,), no_packages))

@@ -18,6 +18,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.gazebo_ros.conversions import link_to_collision_object
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 
@@ -67,7 +68,8 @@ def grasp_scene(model: RobotModel, objects: Sequence[PlacedObject], target: str)
 
 def _messages(item: PlacedObject, frame: str) -> list[Any]:
     path = Path(item.model)
-    model = read_model_text(path.read_text(encoding="utf-8"), str(path), Resources((path.parent.parent,), no_packages))
+    text = read_scaled(path, item.scale)
+    model = read_model_text(text, str(path), Resources((path.parent.parent,), no_packages))
     placed = Pose.from_xyz_rpy(item.xyz, item.rpy)
     return [
         link_to_collision_object(item.name, link, frame, placed @ link.pose) for link in model.links if link.collisions

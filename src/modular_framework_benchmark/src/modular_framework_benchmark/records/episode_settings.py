@@ -27,6 +27,7 @@ class PlacedObject:
         model: Folder in the description package's models, or absolute path of an .sdf file.
         x: Position in the world frame, with y and z [m].
         roll: Angle in the world frame, with pitch and yaw [rad].
+        scale: Factor of the model's lengths; None for the model as it is.
     """
 
     name: str
@@ -37,6 +38,7 @@ class PlacedObject:
     roll: float = 0.0
     pitch: float = 0.0
     yaw: float = 0.0
+    scale: float | None = None
 
     @property
     def xyz(self) -> tuple[float, float, float]:
