@@ -114,6 +114,13 @@ def test_an_object_that_was_released_on_purpose_was_not_dropped() -> None:
     assert failure_class(gave_up, task_succeeded=False) is FailureClass.NO_PLAN
 
 
+def test_any_object_that_the_gripper_lost_counts_not_only_the_first_one() -> None:
+    second = replace(FAILED, target="another", reports=(report("grasp", 3.0),), world=world(6.0, 0.2))
+    assert failure_class(second, task_succeeded=True) is FailureClass.DROPPED
+    placed = replace(second, reports=(report("grasp", 3.0), report("grasp", 6.2)))
+    assert failure_class(placed, task_succeeded=True) is FailureClass.MISPLACED
+
+
 def test_a_task_that_failed_before_any_plan_had_no_candidate() -> None:
     assert failure_class(replace(FAILED, world=world(None)), task_succeeded=False) is FailureClass.NO_CANDIDATE
 

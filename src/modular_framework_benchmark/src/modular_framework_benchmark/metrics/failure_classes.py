@@ -62,7 +62,7 @@ def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> Failure
     if episode.status in _OF_STATUS:
         return _OF_STATUS[episode.status]
     grasps = [report for report in episode.reports if report.component == "grasp"]
-    lost_m = _loss_height(episode.world, episode.target, np.array([report.started_s for report in grasps]))
+    lost_m = _loss_height(episode.world, np.array([report.started_s for report in grasps]))
     if lost_m is not None:
         return FailureClass.SLIPPED if lost_m <= SLIP_HEIGHT_M else FailureClass.DROPPED
     failed = [report for report in episode.reports if not report.succeeded or _is_empty(report)]
@@ -70,8 +70,13 @@ def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> Failure
         return _of_component(max(failed, key=lambda report: report.ended_s), episode)
     if not task_succeeded and not any(report.component in AFTER_GENERATION for report in episode.reports):
         return FailureClass.NO_CANDIDATE
-    held = episode.world is not None and bool(episode.world.holds(episode.target).any())
-    return FailureClass.GRASP_MISSED if grasps and episode.target and not held else FailureClass.MISPLACED
+    missed = grasps and episode.target and not _held_objects(episode.world)
+    return FailureClass.GRASP_MISSED if missed else FailureClass.MISPLACED
+
+
+def _held_objects(world: WorldTrack | None) -> set[str]:
+    """Returns the names of the objects that a gripper has held."""
+    return {name for name, held in world.held.items() if held.any()} if world is not None else set()
 
 
 def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> FailureClass:
@@ -87,15 +92,16 @@ def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> Fail
 
 
 def _robot_collided(report: ComponentReport, episode: EpisodeMeasurements) -> bool:
-    """Returns whether a robot touched anything during a motion except the target and what it touched at the start."""
+    """Returns whether a robot touched anything during a motion except what it handles or touched at the start."""
     world = episode.world
     if world is None:
         return False
+    handled = {episode.target, *_held_objects(world)}
     during = (world.times_s >= report.started_s) & (world.times_s <= report.ended_s)
     return any(
         bool(flags[during].any()) and not flags[0]
         for pair, flags in world.contacts.items()
-        if pair & world.robots and episode.target not in pair
+        if pair & world.robots and not pair & handled
     )
 
 
@@ -108,20 +114,24 @@ def _found_any(report: ComponentReport) -> bool:
     return report.figures.get(CANDIDATES) != 0.0
 
 
-def _loss_height(world: WorldTrack | None, target: str, gripper_motions_s: Floats) -> float | None:
-    """Returns the height above its start at which the gripper lost an object for good [m]; None if it did not.
+def _loss_height(world: WorldTrack | None, gripper_motions_s: Floats) -> float | None:
+    """Returns the height above its start at which the gripper lost an object for good [m]; None without a loss.
 
     Args:
         world: True states of the world.
-        target: Name of the object.
         gripper_motions_s: Starts of the gripper's motions [s since the start of the recording].
     """
-    held = world.holds(target) if world is not None else np.zeros(1, dtype=bool)
-    if world is None or not held.any() or held[-1]:
+    last_loss: tuple[int, float] | None = None
+    if world is None:
         return None
-    last = int(np.flatnonzero(held)[-1])
-    since_motion_s = world.times_s[last] - gripper_motions_s
-    if np.any((since_motion_s >= 0.0) & (since_motion_s <= RELEASE_S)):
-        return None
-    heights = world.bodies[target].positions[:, 2]
-    return float(heights[last] - heights[0])
+    for name in _held_objects(world):
+        held = world.held[name]
+        last = int(np.flatnonzero(held)[-1])
+        if held[-1]:
+            continue
+        since_motion_s = world.times_s[last] - gripper_motions_s
+        if np.any((since_motion_s >= 0.0) & (since_motion_s <= RELEASE_S)):
+            continue
+        heights = world.bodies[name].positions[:, 2]
+        last_loss = max(last_loss or (-1, 0.0), (last, float(heights[last] - heights[0])))
+    return None if last_loss is None else last_loss[1]
