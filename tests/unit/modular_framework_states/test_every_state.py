@@ -32,6 +32,8 @@ EXPECTED = {
     "plan_place",
     "move",
     "grasp",
+    "generate_grasps",
+    "next_in_tower",
     "allow_manipulator_collisions",
     "execute_trajectory",
     "cartesian_move",

@@ -114,6 +114,41 @@ def test_what_does_not_fit_is_refused_with_its_size_and_the_size_of_the_surface(
     assert np.allclose(best.position, [0.15, 0.5, 0.89 + 0.025])
 
 
+def block_below(turn_rad: float) -> list[TriangleMesh]:
+    """A cube of 50 mm on the table at (0.15, 0.5), turned about the vertical."""
+    rotation = Rotation.from_euler("z", turn_rad).as_matrix()
+    return [solid_meshes.moved(CUBE[0], rotation, np.array([0.15, 0.5, 0.865]))]
+
+
+@pytest.mark.parametrize(("below", "held"), [(0.2, 0.9), (-0.7, 0.7), (0.0, math.pi / 4 - 0.01), (3.0, -3.0)])
+def test_a_block_is_turned_by_the_least_angle_that_makes_its_edges_parallel_to_the_block_below(
+    below: float, held: float
+) -> None:
+    top, grasped = upper_face(block_below(below), TargetRegion()), Rotation.from_euler("z", held)
+    poses = place_poses(
+        CUBE, grasped, top, TargetRegion(), PlaceLimits(max_tilt_rad=0.1, overhang_m=1e-6, aligned=True)
+    )
+    assert np.allclose(poses[0].position, [0.15, 0.5, 0.89 + 0.025])
+    yaws = [pose.rotation.as_euler("zyx")[0] for pose in poses]
+    assert len(yaws) == 4
+    assert np.allclose(np.sin([2 * (yaw - below) for yaw in yaws]), 0.0, atol=1e-6)  # multiples of a quarter turn
+    turn = (poses[0].rotation * grasped.inv()).magnitude()
+    assert turn == pytest.approx(abs((below - held + math.pi / 4) % (math.pi / 2) - math.pi / 4), abs=1e-6)
+
+
+def test_a_bar_lies_along_or_across_the_longest_edge_of_its_support() -> None:
+    bar = [solid_meshes.box((0.04, 0.02, 0.02))]
+    support = [
+        solid_meshes.moved(solid_meshes.box((0.1, 0.06, 0.02)), Rotation.from_euler("z", 0.5).as_matrix(), np.zeros(3))
+    ]
+    limits = PlaceLimits(max_tilt_rad=0.1, aligned=True)
+    best = place_poses(bar, Rotation.from_euler("z", 0.6), upper_face(support, TargetRegion()), TargetRegion(), limits)[
+        0
+    ]
+    assert best.rotation.as_euler("zyx")[0] == pytest.approx(0.5)
+    assert best.position[2] == pytest.approx(0.02)
+
+
 def test_the_height_of_the_region_chooses_the_board_of_a_shelf() -> None:
     boards = [
         solid_meshes.moved(solid_meshes.box((0.6, 0.3, 0.02)), np.eye(3), np.array([0, 0.5, z])) for z in (0.5, 0.9)

@@ -23,6 +23,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 FLAT_M = 1.0e-3
 """Distance from the lowest or highest point up to which corners belong to a face [m]."""
 YAWS_RAD = tuple(math.radians(angle) for angle in (0, 45, -45, 90, -90, 135, -135, 180))
+QUARTERS_RAD = tuple(math.radians(angle) for angle in (0, 90, -90, 180))
 POSITIONS = (0.0, -0.6, 0.6)
 """Positions along each axis of a region, as fractions of its half width; the centre comes first."""
 UNLIMITED = (-math.inf, math.inf)
@@ -108,11 +109,13 @@ class PlaceLimits:
         max_tilt_rad: Largest angle between the vertical and the direction that was vertical at the grasp [rad].
         overhang_m: Distance by which the lower face of the object may leave the supporting face [m].
         gap_m: Distance between the object and the face [m].
+        aligned: Whether the longest edges of the two faces must be parallel or perpendicular.
     """
 
     max_tilt_rad: float = math.pi
     overhang_m: float = 0.0
     gap_m: float = 0.0
+    aligned: bool = False
 
 
 FLAT = PlaceLimits()
@@ -222,7 +225,8 @@ def place_poses(
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
     points, excess, poses = _positions(face, region), [], []
     for upright in _upright(stable_directions(solids), held, limits.max_tilt_rad):
-        stances = [_stance(Rotation.from_euler("z", yaw) * upright, corners - centre) for yaw in YAWS_RAD]
+        yaws = _aligned_yaws(_stance(upright, corners - centre).feet, face.corners) if limits.aligned else YAWS_RAD
+        stances = [_stance(Rotation.from_euler("z", yaw) * upright, corners - centre) for yaw in yaws]
         height = face.height + limits.gap_m + stances[0].height
         if not region.z[0] <= height <= region.z[1]:
             excess.append(math.inf)
@@ -263,6 +267,26 @@ def _stance(rotation: Rotation, corners: Array) -> _Stance:
     turned = rotation.apply(corners)
     lowest = turned[:, 2].min()
     return _Stance(rotation, turned[turned[:, 2] < lowest + FLAT_M, :2], float(-lowest))
+
+
+def _aligned_yaws(feet: Array, corners: Array) -> tuple[float, ...]:
+    """Returns the rotations that align the longest edges of two faces, the smallest first [rad].
+
+    Args:
+        feet: Corners of the lower face of an object, shape (n, 2) [m].
+        corners: Corners of the supporting face, shape (m, 2) [m].
+    """
+    quarter = math.pi / 2
+    turn = (_longest_edge_angle(corners) - _longest_edge_angle(feet) + quarter / 2) % quarter - quarter / 2
+    return tuple(sorted((turn + yaw for yaw in QUARTERS_RAD), key=abs))
+
+
+def _longest_edge_angle(points: Array) -> float:
+    """Returns the direction of the longest edge of the convex hull of points, shape (n, 2) [rad]."""
+    outline = points[ConvexHull(points).vertices]
+    edges = np.roll(outline, -1, axis=0) - outline
+    x, y = edges[np.argmax(np.linalg.norm(edges, axis=1))]
+    return math.atan2(y, x)
 
 
 def _upright(directions: Array, held: Rotation, max_tilt_rad: float) -> list[Rotation]:

@@ -28,6 +28,7 @@ from modular_framework_benchmark.records.used_software import (
     named_solvers,
     solver_substitutions,
 )
+from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
@@ -76,6 +77,7 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
     """Returns the SHA-256 of what determines the episodes of a stack, keyed by description."""
     urdf, srdf = (str(_value(parameters, name)) for name in DESCRIPTIONS)
     named = {what: Path(str(_value(parameters, name))) for what, name in FILE_PARAMETERS.items()}
+    named |= {f"machine {file.name}": file for file in machine_files(named["task"])}
     digests = {what: file_digest(path) for what, path in named.items() if path.is_file()}
     folder = str(_value(parameters, MODEL_PATH))
     resources = model_resources(folder)

@@ -16,11 +16,12 @@ from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA, SuccessCriteria
-from modular_framework_benchmark.predicates.conditions import Region
+from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, Region
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, PlacedObject, SettingsError
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.key_spelling import intended_key
+from modular_framework_core.task_constructor.machine_files import machine_files
 
 DEFAULT_TASK = "simulation_pick.yaml"
 OWN_ARGUMENTS = {
@@ -132,6 +133,8 @@ class TaskSettings(EpisodeSettings):
     def judged_object(self) -> str:
         """Name of the object that grasp metrics describe; "" if no object is judged.
 
+        The object is the first object that a predicate wants lifted or held, or else the first object.
+
         Raises:
             SettingsError: An object must be lifted and held, but there are no objects.
         """
@@ -143,7 +146,17 @@ class TaskSettings(EpisodeSettings):
             raise SettingsError(
                 "setting 'success' names no object, and there are no objects; add 'object', or remove 'success'"
             )
-        return self.success.object or self.objects[0].name
+        return self.success.object or self._first_grasped or self.objects[0].name
+
+    @property
+    def _first_grasped(self) -> str:
+        """Returns the name of the first object that a predicate wants lifted or held; "" for none."""
+        if self.success.is_pick:
+            return ""
+        required = self.success.required
+        predicates = [*([required] if required is not None else []), *(each.predicate for each in self.progress)]
+        conditions = [condition for predicate in predicates for condition in predicate.conditions]
+        return next((item.object for item in conditions if isinstance(item, Lifted | HeldFor)), "")
 
     @property
     def has_milestones(self) -> bool:
@@ -157,8 +170,8 @@ class TaskSettings(EpisodeSettings):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Returns the task script."""
-        return (Path(self.task),) if self.task else ()
+        """Returns the task script and the files of its machines."""
+        return (Path(self.task), *machine_files(Path(self.task))) if self.task else ()
 
 
 def _finish(
@@ -181,7 +194,7 @@ def _finish(
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
     objects = placed_objects(nodes, settings.launch, sound, reading)
-    if "objects" in read.unreadable or len(objects) < len(nodes):
+    if "objects" in read.unreadable or len(objects) < sum(node.count or 1 for node in nodes):
         names = KnownNames()
     else:
         names = KnownNames(tuple(found.name for found in objects), _world_models(read, settings.launch, sound, reading))

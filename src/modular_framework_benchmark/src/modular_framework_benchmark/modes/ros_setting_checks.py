@@ -19,6 +19,7 @@ from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method, method_class
+from modular_framework_benchmark.modes.ros_grasp_widths import grasp_width_faults
 from modular_framework_benchmark.modes.ros_kinematics_runner import (
     KinematicsEpisodeRunner,
     check_solver,
@@ -137,7 +138,8 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
         return CheckedSettings((), None)
     settings, is_known = read.settings, "arguments" not in read.unreadable
     try:
-        launch = preview_stack(settings).preview
+        stack = preview_stack(settings)
+        launch = stack.preview
     except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
     regions = [region.name for region in settings.regions]
@@ -148,6 +150,9 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
         for item in found
         if item.key not in read.unreadable
     )
+    if not faults and not read.unreadable:
+        parameters = {**launch.parameters, **settings.parameters}
+        faults = tuple(grasp_width_faults(read, parameters, stack.launch.method_nodes))
     if faults or read.unreadable:
         return CheckedSettings(faults, None)
     return CheckedSettings(

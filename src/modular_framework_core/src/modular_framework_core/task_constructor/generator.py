@@ -76,8 +76,9 @@ def default_output_directory() -> Path:
 
 
 def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
-    """Returns a line with a digest of the task script, its states, the templates and the generator."""
+    """Returns a line with a digest of the task script, its machines and states, the templates and the generator."""
     files = [Path(task.script), *sorted({state.source.file for state in task.root.leaf_states()}), Path(__file__)]
+    files += sorted({Path(machine.location.file) for machine in task.root.machines()} - {Path(task.script)})
     files += sorted(file for folder in templates for file in folder.iterdir() if file.is_file())
     digest = hashlib.sha256()
     for file in files:

@@ -8,6 +8,7 @@ from typing import Any
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.option_types import or_reference
 from modular_framework_core.task_constructor.explanation import option_meanings
+from modular_framework_core.task_constructor.machine_files import SUFFIX
 from modular_framework_core.task_constructor.machine_keys import NAME_MAP, NAMES, OUTCOMES, machine_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSource, StateSourceError
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
@@ -27,6 +28,7 @@ def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[st
         "state": {
             "oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable_states]
             + [{"$ref": f"#/definitions/machine_{template.name}"} for template in usable_templates]
+            + [{"$ref": "#/definitions/machine_file"}]
         },
         "states": {
             "type": "array",
@@ -37,6 +39,18 @@ def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[st
                 "maxProperties": 1,
                 "additionalProperties": {"$ref": "#/definitions/state"},
             },
+        },
+        "machine_file": {
+            "type": "object",
+            "description": "Machine in a file of its own.",
+            "properties": {
+                "source": {"type": "string", "pattern": f"\\{SUFFIX}$"},
+                "params": {"type": "object"},
+                "transitions": or_reference(NAME_MAP),
+                "remapping": or_reference(NAME_MAP),
+            },
+            "required": ["source"],
+            "additionalProperties": False,
         },
         **{f"state_{source.name}": _state(source) for source in usable_states},
         **{f"machine_{template.name}": _machine(template, is_root=False) for template in usable_templates},

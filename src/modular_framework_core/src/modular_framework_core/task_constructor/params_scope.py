@@ -67,7 +67,12 @@ class ParamsScope:
 
 
 def _moved(value: Node, reference: Node) -> Node:
-    """Returns a value relocated to its reference, where users look for a mistake."""
+    """Returns a value relocated to its reference, where users look for a mistake.
+
+    A value that another file gives keeps its location, because that file must be corrected.
+    """
+    if value.location.file != reference.location.file:
+        return value
     match value:
         case Scalar():
             return Scalar(value.value, reference.location)

@@ -13,6 +13,7 @@ from modular_framework_core.task_constructor import header_fields, machine_check
 from modular_framework_core.task_constructor.key_spelling import intended_key, value_of
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
+from modular_framework_core.task_constructor.machine_files import machine_file, with_machine_file
 from modular_framework_core.task_constructor.machine_header import HeaderReader
 from modular_framework_core.task_constructor.machine_keys import UNREAD, root_keys
 from modular_framework_core.task_constructor.option_use_checks import check_uses
@@ -61,6 +62,7 @@ class TaskBuilder:
         self._known = known or KnownNames()
         self._headers = HeaderReader(states, templates, faults)
         self._state_builder = StateBuilder(states, faults)
+        self._open_files: list[Path] = []
         self._used_type_names = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
@@ -230,6 +232,25 @@ class TaskBuilder:
         return entries, labels
 
     def _child(
+        self, label: str, location: SourceLocation, body: Mapping, outer_scope: ParamsScope, parent_type: str
+    ) -> tuple[ChildSpec | None, ChildLinks]:
+        file = machine_file(body)
+        if file is None:
+            return self._own_child(label, location, body, outer_scope, parent_type)
+        complete = None
+        if file in self._open_files:
+            self._faults.add(body.entries["source"].location, f"the machine of {file.name} contains itself")
+        else:
+            complete = with_machine_file(label, body, file, self._faults)
+        if complete is None:
+            return None, ChildLinks(label, None, None, {}, location)
+        self._open_files.append(file)
+        try:
+            return self._own_child(label, location, complete, outer_scope, parent_type)
+        finally:
+            self._open_files.pop()
+
+    def _own_child(
         self, label: str, location: SourceLocation, body: Mapping, outer_scope: ParamsScope, parent_type: str
     ) -> tuple[ChildSpec | None, ChildLinks]:
         is_machine = "states" in body.entries or bool(self._headers.template_named(value_of(body, "source")))

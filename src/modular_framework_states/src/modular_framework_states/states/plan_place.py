@@ -16,7 +16,7 @@ from modular_framework_core.grasp_generation.planning_scene_objects import Scene
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Limits, NotNegative, Positive
-from modular_framework_core.state_api.option_uses import Named
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key, Named
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result
 from modular_framework_states.grasp_stages import StageError
@@ -41,9 +41,12 @@ class PlanPlace(FrameworkState):
     the hand does not tip the object. The action ``place`` of move_group plans the motions.
 
     Args:
-        support: Model or planning scene object that the object is put on.
+        support: Model or planning scene object that the object is put on; ``userdata`` for the input key
+            ``selected_support``.
         region: Name of a region of the parameter ``/regions``; empty for the whole surface.
         overhang: Distance by which the lower face of the object may leave the support [m].
+        align: Whether the longest edge of the lower face is parallel or perpendicular to the longest edge of the
+            support's upper face, as for blocks of a tower.
         max_tilt: Largest angle by which the object may be tilted with respect to its orientation at the grasp [rad].
         posture: Posture of the fingers after the release, a state of the manipulator's planning group.
         approach_plan: Name of the stored plan down to the place.
@@ -57,9 +60,10 @@ class PlanPlace(FrameworkState):
 
     def __init__(
         self,
-        support: str,
+        support: Annotated[str, Key("input", "selected_support", when=FROM_USERDATA)],
         region: Annotated[str, Named("region")] = "",
         overhang: NotNegative = 0.0,
+        align: bool = False,
         max_tilt: Annotated[float, Limits(at_least=0.0, at_most=3.15)] = 0.3,
         posture: Annotated[str, Named("posture")] = "open",
         approach_plan: Annotated[str, Named("plan", made=True)] = "place_approach",
@@ -69,7 +73,9 @@ class PlanPlace(FrameworkState):
     ) -> None:
         super().__init__(**keys)
         self._support, self._region, self._posture = support, region, posture
-        self._limits = PlaceLimits(max_tilt_rad=float(max_tilt), overhang_m=float(overhang), gap_m=GAP_M)
+        self._limits = PlaceLimits(
+            max_tilt_rad=float(max_tilt), overhang_m=float(overhang), gap_m=GAP_M, aligned=bool(align)
+        )
         self._plan_names, self._timeout_s = {"approach": approach_plan, "retreat": retreat_plan}, float(timeout)
 
     def execute(self, userdata: Any) -> str:
@@ -77,8 +83,11 @@ class PlanPlace(FrameworkState):
         commander, grasp = userdata.arm_commander, userdata.selected_grasp
         if grasp is None:
             return self.fail("userdata 'selected_grasp' is empty; select the grasp that holds the object first")
+        support = userdata.selected_support if self._support == FROM_USERDATA else self._support
+        if not support:
+            return self.fail("userdata 'selected_support' is empty; select the support first")
         try:
-            scene = read_place_scene(commander, grasp, self._support)
+            scene = read_place_scene(commander, grasp, support)
             result, text = self._planned(commander, self._goal(commander, scene))
             if self.preempt_requested():
                 return self.stopped()
@@ -89,7 +98,7 @@ class PlanPlace(FrameworkState):
             for stage, name in self._plan_names.items():
                 store_plan(stages[stage], name)
         except FAULTS as error:
-            return self.fail(f"place on '{self._support}': {error}")
+            return self.fail(f"place on '{support}': {error}")
         start = stages["approach"].joint_trajectory
         userdata.selected_joint_state = JointState(name=start.joint_names, position=start.points[0].positions)
         return self.succeed()

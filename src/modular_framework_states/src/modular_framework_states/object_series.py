@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the numbered objects of the planning scene, such as the blocks of a tower."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
+
+from modular_framework_ros.allowed_names import listing
+from modular_framework_ros.calls import request_service
+
+SERVICE_TIMEOUT_S = 10.0
+COMPONENTS = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+LINK_SEPARATOR = "__"
+"""Separator of model and link in the names of simulated objects."""
+
+
+class SeriesError(ValueError):
+    """The numbered objects are incomplete; the text states what was found and what is allowed."""
+
+
+def scene_objects() -> list[str]:
+    """Returns the names of the objects of the planning scene, of models without their links.
+
+    Raises:
+        CallError: move_group does not respond.
+    """
+    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=COMPONENTS))
+    scene = request_service("get_planning_scene", GetPlanningScene, request, SERVICE_TIMEOUT_S).scene
+    ids = [item.id for item in scene.world.collision_objects]
+    ids += [item.object.id for item in scene.robot_state.attached_collision_objects]
+    return sorted({name.partition(LINK_SEPARATOR)[0] for name in ids})
+
+
+def object_series(prefix: str, names: Iterable[str]) -> list[str]:
+    """Returns the objects ``<prefix>_1``, ``<prefix>_2``, ... in the order of their numbers.
+
+    Args:
+        prefix: Common part of the names.
+        names: Names of all objects.
+
+    Raises:
+        SeriesError: There are fewer than two, or a number is missing.
+    """
+    present = set(names)
+    stem = f"{prefix}_"
+    numbers = sorted(int(rest) for name in present if (rest := name.removeprefix(stem)) != name and rest.isdecimal())
+    if len(numbers) < 2 or numbers != list(range(1, len(numbers) + 1)):
+        found = ", ".join(f"{stem}{number}" for number in numbers) or "none"
+        raise SeriesError(
+            f"the planning scene has these objects of '{prefix}': {found}; a tower needs {stem}1, {stem}2, ... without "
+            f"a gap; {listing(sorted(present), 'the planning scene has no objects')}"
+        )
+    return [f"{stem}{number}" for number in numbers]
