@@ -16,6 +16,9 @@ from modular_framework_testing.ros_session import RosSession
 ORIGINAL_CONFIGURATION = Path(__file__).resolve().parents[1] / "original_configuration"
 TASK_TIMEOUT_S = 180.0
 LIFTED_M = 0.10
+BUSY_MACHINE = "still waiting for|no transform from"
+"""Warnings of nodes that wait long for others at the start."""
+MAX_LINES = 110  # of the log: roslaunch 36, start 16, states 39
 
 # Runs as a node of its own beside the launch and prints how high each model was at first and at last, and how many
 # messages said so, the last of them how many seconds after the first.
@@ -66,12 +69,12 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
     assert "Task 'simulation_pick' ended with outcome 'successful_pipeline': SUCCEEDED" in launch.log()
     assert launch.log().splitlines()[-1] == "run_framework: the task succeeded"
     assert "REQUIRED process" not in launch.log() and "Traceback" not in launch.log(), launch.log()
-    alarms = [
-        line
-        for line in launch.log().splitlines()
-        if re.search("stalled: joint|has no effect|world without effect|build time", line)
-    ]
+    lines = [line for line in launch.log().splitlines() if not re.search(BUSY_MACHINE, line)]
+    is_plain = (robot, method) == ("modular_framework_api", "top_down_grasps")  # others try grasps out of reach, too
+    phrases = "stalled: joint|has no effect|world without effect|build time|ended with code"
+    alarms = [line for line in lines if re.search(r"WARN|ERROR|FATAL" if is_plain else phrases, line)]
     assert not alarms, alarms
+    assert not is_plain or len(lines) <= MAX_LINES, launch.log()
     lifted = {name: last - first for name, (first, last) in heights.items()}
     assert ended and max(lifted.values()) > LIFTED_M, f"{lifted}\n{launch.log()}"
     assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted

@@ -47,10 +47,12 @@ class CameraProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._connected = False
+        self._ending = threading.Event()
 
     def connect(self) -> None:
         """Starts the process, immediately or with the first camera."""
         self._connected = True
+        rospy.on_shutdown(self._ending.set)
         if not self._cameras:
             return
         self._tracker = self._make_tracker()
@@ -101,8 +103,9 @@ class CameraProcess:
                         self._due_ns[name] = 0
         except (EOFError, OSError):
             self._report = SceneReport(0, {})
-        if self._pipe is not None and not rospy.is_shutdown():
-            code = process.wait()
+        code = process.wait()
+        # The interrupt at the end of a launch reaches both processes, and the cameras may end first.
+        if not self._ending.wait(_END_TIMEOUT_S):
             rospy.logerr("the camera process ended with code %d; cameras publish no more images", code)
 
     def tick(self, time_ns: int) -> None:
@@ -137,6 +140,7 @@ class CameraProcess:
     def close(self) -> None:
         """Ends the process; may be called twice."""
         self._connected = False
+        self._ending.set()
         pipe, self._pipe = self._pipe, None
         if pipe is None or self._process is None:
             return
