@@ -15,7 +15,7 @@ from modular_framework_simulation.errors import DescriptionError, LoopTimeoutErr
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.loop.grasp_watch import GraspWatch
-from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.pacing import Pacer, RestSpeed
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.models.mesh_files import ConvexParts, load_mesh
 from modular_framework_simulation.models.sdf_specs import Mesh
@@ -95,15 +95,34 @@ def test_time_that_nobody_waits_for_may_pass_at_another_pace() -> None:
     assert time.now == pytest.approx(50.4)
 
 
-def test_as_fast_as_possible_leaves_the_processor_to_nodes_while_the_robot_stands_still() -> None:
-    time = FakeTime()
-    pacer = Pacer(0.0, time.clock, time.sleep)
+def test_as_fast_as_possible_leaves_busy_processors_to_nodes_while_the_robot_stands_still() -> None:
+    time, idle_processors, idle_s = FakeTime(), 0.0, [0.0]
+
+    def simulated_in(real_s: float) -> float:
+        begun, steps = time.now, 0
+        while time.now - begun < real_s:
+            steps += 1
+            before = time.now
+            pacer.keep(simulated[0] + steps * 0.01, still=True)
+            idle_s[0] += (time.now - before) * idle_processors
+        simulated[0] += steps * 0.01
+        return steps * 0.01
+
+    simulated = [0.0]
+    pacer = Pacer(0.0, time.clock, time.sleep, rest_speed=RestSpeed(lambda: idle_s[0]))
+    assert simulated_in(2.0) == pytest.approx(2.0, abs=0.1)
+    idle_processors = 1.0
+    simulated_in(1.0)
+    assert simulated_in(1.0) > 50.0
+    idle_processors = 0.0
+    simulated_in(2.0)
+    assert simulated_in(1.0) == pytest.approx(1.0, abs=0.1)
+    idle_processors = 1.0
+    simulated_in(1.0)
     begun = time.now
-    pacer.keep(1.0, still=True)
-    pacer.keep(9.0, still=True)
-    assert time.now - begun == pytest.approx(8.0 / 4.0)
-    pacer.keep(500.0)
-    assert time.now - begun == pytest.approx(8.0 / 4.0)
+    pacer.keep(simulated[0] + 500.0)
+    assert time.now == begun
+    assert simulated_in(0.1) < 0.5
 
 
 def test_what_arrives_while_the_loop_sleeps_is_carried_out_at_once_and_the_sleep_goes_on() -> None:

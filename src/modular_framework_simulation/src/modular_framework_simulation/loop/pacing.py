@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import psutil
+
 _MAX_LAG_S = 1.0
 """Maximum lag that is caught up [s]; after a longer stall, such as a suspended machine, the excess is dropped."""
 
@@ -16,10 +18,12 @@ _LEAD_S, _REST_LEAD_S = 0.008, 0.018
 Consecutive steps find their data in the CPU caches, so five steps of 2 ms and one sleep cost less than five steps with
 five sleeps."""
 
-_REST_FACTOR = 4.0
-"""Real-time factor of "as fast as possible" while the robot is at rest without a command. Nodes compute during this
-time, and every message of the simulation costs them CPU time. The shipped pick takes 24 s of CPU time with factor 4,
-32 s with factor 10, and 56 s without a limit."""
+_REST_PERIOD_S = 0.1
+"""Interval at which the factor at rest follows the idle processors [s]."""
+
+_MAX_REST_FACTOR = 1024.0
+_IDLE_PROCESSORS, _BUSY_PROCESSORS = 0.5, 0.25
+"""Number of idle processors above which the factor at rest doubles, and below which it halves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,43 @@ class PaceReport:
     step_cost_s: float
 
 
+class RestSpeed:
+    """Chooses the real-time factor of "as fast as possible" while the robot is at rest without a command.
+
+    Nodes compute during this time, and every message of the simulation costs them processor time. The factor starts at
+    1, doubles while processors are idle, and halves while they are not.
+
+    Args:
+        idle_s: Function that returns the time for which processors have been idle, summed over all processors [s].
+    """
+
+    def __init__(self, idle_s: Callable[[], float] = lambda: psutil.cpu_times().idle) -> None:
+        self._idle_s = idle_s
+        self._factor = 1.0
+        self._last_real_s = self._last_idle_s = math.nan
+
+    def restart(self) -> None:
+        """Sets the factor to 1, because the robot moves or its nodes start to compute."""
+        self._factor, self._last_real_s = 1.0, math.nan
+
+    def factor(self, real_s: float) -> float:
+        """Returns the factor, a power of two.
+
+        Args:
+            real_s: Current real time [s].
+        """
+        if real_s - self._last_real_s < _REST_PERIOD_S:
+            return self._factor
+        idle_s = self._idle_s()
+        idle_processors = (idle_s - self._last_idle_s) / (real_s - self._last_real_s)
+        if idle_processors > _IDLE_PROCESSORS:
+            self._factor = min(2.0 * self._factor, _MAX_REST_FACTOR)
+        elif idle_processors < _BUSY_PROCESSORS:
+            self._factor = max(0.5 * self._factor, 1.0)
+        self._last_real_s, self._last_idle_s = real_s, idle_s
+        return self._factor
+
+
 class Pacer:
     """Sleeps while simulated time is ahead of real time.
 
@@ -48,6 +89,7 @@ class Pacer:
         clock: Function that returns real time [s].
         sleep: Function that waits for a time [s].
         idle_limit: Maximum factor while no node waits for simulated time; None for no limit.
+        rest_speed: Factor of "as fast as possible" while the robot is at rest.
     """
 
     def __init__(
@@ -56,7 +98,9 @@ class Pacer:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
         idle_limit: float | None = None,
+        rest_speed: RestSpeed | None = None,
     ) -> None:
+        self._rest_speed = rest_speed or RestSpeed()
         self._idle_limit = idle_limit
         self.real_time_factor = self._initial_factor = real_time_factor
         self._factor = real_time_factor
@@ -113,7 +157,9 @@ class Pacer:
         """
         factor = self._idle_factor if idle else self.real_time_factor
         if factor == 0.0 and still:
-            factor = _REST_FACTOR
+            factor = self._rest_speed.factor(self._clock())
+        else:
+            self._rest_speed.restart()
         if self._factor != factor:
             self._factor = factor
             self.start(simulated_s)
