@@ -135,6 +135,7 @@ arm:
     joints: [a]
     command_interfaces: [effort]
     state_interfaces: [position, velocity]
+    open_loop_control: true
     constraints: {constraints}
     gains: {{a: {{p: 10.0, d: 1.0, ff_velocity_scale: 0.5}}}}
 """
@@ -143,6 +144,7 @@ arm:
     context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
     values = context.parameters.values()
     assert values["/arm/constraints/goal_time"] == 1e9
+    assert not [name for name in values if "interfaces" in name or "open_loop" in name]  # a warning in ROS 1
     assert values.get("/arm/constraints/stopped_velocity_tolerance", 0.02) == 0.02
     assert values.get("/arm/constraints/a/goal", 0.03) == 0.03
     assert (values["/arm/gains/a/p"], values["/arm/gains/a/d"], values["/arm/velocity_ff/a"]) == (10.0, 1.0, 0.5)

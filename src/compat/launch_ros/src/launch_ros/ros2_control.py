@@ -62,6 +62,9 @@ JOINT_COMMANDS = {
     ("acceleration", "position", "velocity"): JointCommands("PosVelAccJointInterface", "pos_vel_acc_controllers"),
 }
 """Names in ros_control, by sorted ROS 2 command interfaces of a joint."""
+CONVERTED_PARAMETERS = ("command_interfaces", "state_interfaces", "interface_name", "open_loop_control")
+"""Parameters of ROS 2 controllers that select the type and the constraints in ROS 1, or that describe what ROS 1 always
+does: with `open_loop_control`, motions start at the last commanded positions."""
 
 
 def source_of(path: str) -> ParameterSource:
@@ -149,7 +152,8 @@ def _is_controller(value: Any) -> bool:
 
 
 def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str, Any]:
-    ros1 = {**parameters, "type": ros1_type(type_name, parameters)}
+    ros1 = {name: value for name, value in parameters.items() if name not in CONVERTED_PARAMETERS}
+    ros1["type"] = ros1_type(type_name, parameters)
     if type_name == TRAJECTORY_TYPE:
         ros1 |= _ros1_trajectory_parameters(parameters)
     if ros1["type"] == "joint_state_controller/JointStateController":
@@ -158,10 +162,7 @@ def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str,
 
 
 def _ros1_trajectory_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Converts the parameters of ROS 2's trajectory controller that have another name or meaning in ROS 1.
-
-    `open_loop_control` is not converted, because motions of ROS 1 always start at the last commanded positions.
-    """
+    """Converts the parameters of ROS 2's trajectory controller that have another name or meaning in ROS 1."""
     constraints = dict(parameters.get("constraints", {}))
     if not constraints.get("goal_time"):
         constraints["goal_time"] = NO_TIME_LIMIT_S
