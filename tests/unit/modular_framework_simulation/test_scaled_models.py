@@ -48,5 +48,5 @@ def test_a_model_with_a_joint_is_refused() -> None:
     joint = '<joint name="j" type="fixed"><parent>link</parent><child>link</child></joint></model>'
     with pytest.raises(DescriptionError, match="got a <joint>; allowed in a model with a size: links and shapes alone"):
         scaled_model(text_of("cube").replace("</model>", joint), 2.0, "cube")
-    with pytest.raises(DescriptionError, match="got no XML"):
+    with pytest.raises(DescriptionError, match="cube:1: not an XML document"):
         scaled_model("no model", 2.0, "cube")

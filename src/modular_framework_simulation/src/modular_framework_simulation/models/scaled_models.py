@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_urdf.xml_text import Element, XmlError, add_child, parse, to_text
 
 LENGTHS = ("size", "radius", "length", "scale")
 """Elements of a geometry that contain lengths, or the scale of a mesh."""
@@ -43,14 +43,14 @@ def scaled_model(text: str, factor: float, where: str) -> str:
         DescriptionError: The text is not XML, or the model has parts that cannot be scaled.
     """
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise DescriptionError(where, f"got no XML ({error})", "allowed: an SDF file") from error
+        root = parse(text, where)
+    except XmlError as error:
+        raise DescriptionError(error.where, error.found, error.allowed) from error
     if found := next((name for name in UNSCALABLE if root.find(f".//{name}") is not None), ""):
         raise DescriptionError(where, f"got a <{found}>", "allowed in a model with a size: links and shapes alone")
     for mesh in root.iter("mesh"):
         if mesh.find("scale") is None:
-            ElementTree.SubElement(mesh, "scale").text = "1 1 1"
+            add_child(mesh, "scale").text = "1 1 1"
     for pose in root.iter("pose"):
         _multiply(pose, factor, first=3)
     for geometry in root.iter("geometry"):
@@ -61,10 +61,10 @@ def scaled_model(text: str, factor: float, where: str) -> str:
         for element in inertial.iter():
             if element.tag == "mass" or element.tag in MOMENTS:
                 _multiply(element, factor**3 if element.tag == "mass" else factor**5)
-    return ElementTree.tostring(root, encoding="unicode")
+    return to_text(root)
 
 
-def _multiply(element: ElementTree.Element, factor: float, first: int | None = None) -> None:
+def _multiply(element: Element, factor: float, first: int | None = None) -> None:
     """Multiplies the first numbers of an element, by default all numbers."""
     words = (element.text or "").split()
     count = len(words) if first is None else first
