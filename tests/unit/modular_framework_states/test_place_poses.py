@@ -108,7 +108,7 @@ def test_what_does_not_fit_is_refused_with_its_size_and_the_size_of_the_surface(
     large = [solid_meshes.box((0.1, 0.1, 0.05))]
     with pytest.raises(PlaceError) as fault:
         place_poses(large, IDENTITY, top, TargetRegion(), PlaceLimits(max_tilt_rad=0.1))
-    assert "leaves the face of 0.050 x 0.050 m by at least 0.025 m" in str(fault.value)
+    assert "extends beyond the face of 0.050 x 0.050 m by at least 0.025 m" in str(fault.value)
     assert "allowed: 0 m" in str(fault.value)
     best = place_poses(large, IDENTITY, top, TargetRegion(), PlaceLimits(max_tilt_rad=0.1, overhang_m=0.03))[0]
     assert np.allclose(best.position, [0.15, 0.5, 0.89 + 0.025])

@@ -85,7 +85,7 @@ def read_number(handle: NodeHandle, key: str, default: float, minimum: float | N
         minimum: Minimum allowed value; None for no bound.
 
     Raises:
-        ParameterError: The value is not a finite number or below `minimum`.
+        ParameterError: The value is not a finite number, or is below `minimum`.
     """
     value = handle.get_param(key, default)
     where = join_names(handle.namespace, key)

@@ -241,9 +241,9 @@ def place_poses(
     if not poses:
         size, footprint = np.ptp(face.corners, axis=0), np.ptp(stance.feet, axis=0)
         raise PlaceError(
-            f"the object stands on {footprint[0]:.3f} x {footprint[1]:.3f} m and leaves the face of {size[0]:.3f} x "
-            f"{size[1]:.3f} m by at least {min(excess):.3f} m within {region.label}; allowed: {limits.overhang_m:g} m; "
-            "choose another region or support, or allow more overhang"
+            f"the object's footprint of {footprint[0]:.3f} x {footprint[1]:.3f} m extends beyond the face of "
+            f"{size[0]:.3f} x {size[1]:.3f} m by at least {min(excess):.3f} m within {region.label}; "
+            f"allowed: {limits.overhang_m:g} m; choose another region or support, or allow more overhang"
         )
     return poses
 

@@ -71,7 +71,7 @@ def programs_of_package(package: str) -> set[str]:
 
 
 def plugin_descriptions(package: str) -> list[Path]:
-    """Returns the plugin description files that ROS packages export to a package, including its own files.
+    """Returns the plugin description files that all ROS packages, including the package itself, export to a package.
 
     Raises:
         PackageNotFoundError: The package does not exist.

@@ -33,7 +33,9 @@ def joint_tree(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
     zeros = np.zeros(pin_model.nq)
     axes, prismatic = [], []
     for joint_id in joint_ids:  # a joint's column of its own Jacobian is its axis, linear above angular
-        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(6, -1)  # flat for one joint
+        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(
+            6, -1
+        )  # one-dimensional for a tree with one joint
         column = jacobian[:, pin_model.joints[joint_id].idx_v]
         prismatic.append(bool(np.linalg.norm(column[:3]) > 0.5))
         axes.append(column[:3] if prismatic[-1] else column[3:])
@@ -58,7 +60,7 @@ def with_ball_joint(chain: Chain, joint: Array, width: int) -> Chain:
     Args:
         chain: Chain driven by group values.
         joint: Pose of the ball joint in the frame of the chain's tip, shape (4, 4).
-        width: Number of group values, which the three values of the ball joint follow.
+        width: Number of group values; the three values of the ball joint come after them.
     """
     ball_placement = (np.vstack([chain.tip, (0.0, 0.0, 0.0, 1.0)]) @ joint)[:3]
     last_index, tree = len(chain.drivers) - 1, chain.tree

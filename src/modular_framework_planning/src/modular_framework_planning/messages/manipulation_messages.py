@@ -217,7 +217,7 @@ def place_manoeuvre(
 
 
 def _link_pose(scene: PlanningScene, object_pose: Transform, held: AttachedObject, link: str) -> Transform:
-    """Returns the pose of the link when the held object has this pose."""
+    """Returns the pose of the link that puts the held object at the given pose."""
     links = scene.model.link_transforms(scene.positions)
     object_in_link = links[link].inverse() * links[held.link] * held.body.pose
     return object_pose * object_in_link.inverse()

@@ -104,7 +104,7 @@ class PlanningPipeline:
         return tuple(getattr(self._planner, "auxiliary_constraints", ()))
 
     def group_planners(self, group: str) -> tuple[str, ...]:
-        """Returns the planner_configs of a group whose planner exists."""
+        """Returns the planner_configs of a group, without those whose planner does not exist."""
         names = [str(name) for name in self.settings.groups.get(group, {}).get("planner_configs") or ()]
         allowed = self.planner_ids
         return tuple(name for name in names if not allowed or self._configuration(name, group)[0] in allowed)

@@ -22,7 +22,7 @@ _MAX_RATE_HZ = 1e6
 class PhysicsValues:
     """Physics settings by public names.
 
-    The physics engine does not support the settings with default values; they read as 0 and have no effect.
+    The physics engine does not support the settings that have a default below; they read as 0 and have no effect.
 
     Attributes:
         time_step: Duration of a physics step [s].
