@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from modular_framework_core.managers import ros_simulated_objects
 from modular_framework_states import object_series as series_module
 from modular_framework_states.object_series import SeriesError, object_series
 from modular_framework_states.states import generate_grasps as generate_module
@@ -41,7 +42,7 @@ def test_models_are_named_without_their_links_and_held_objects_count(monkeypatch
     scene = SimpleNamespace(
         world=SimpleNamespace(collision_objects=world), robot_state=SimpleNamespace(attached_collision_objects=held)
     )
-    monkeypatch.setattr(series_module, "request_service", lambda *arguments: SimpleNamespace(scene=scene))
+    monkeypatch.setattr(ros_simulated_objects, "request_service", lambda *arguments: SimpleNamespace(scene=scene))
     assert series_module.scene_objects() == ["block_1", "block_2", "table"]
 
 

@@ -5,16 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from moveit_msgs.msg import PlanningSceneComponents
-from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
-
+from modular_framework_core.managers.acm import LINK_SEPARATOR
+from modular_framework_core.managers.ros_simulated_objects import planning_scene_objects
 from modular_framework_ros.allowed_names import listing
-from modular_framework_ros.calls import request_service
 
 SERVICE_TIMEOUT_S = 10.0
-COMPONENTS = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
-LINK_SEPARATOR = "__"
-"""Separator of model and link in the names of simulated objects."""
 
 
 class SeriesError(ValueError):
@@ -27,11 +22,7 @@ def scene_objects() -> list[str]:
     Raises:
         CallError: move_group does not respond.
     """
-    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=COMPONENTS))
-    scene = request_service("get_planning_scene", GetPlanningScene, request, SERVICE_TIMEOUT_S).scene
-    ids = [item.id for item in scene.world.collision_objects]
-    ids += [item.object.id for item in scene.robot_state.attached_collision_objects]
-    return sorted({name.partition(LINK_SEPARATOR)[0] for name in ids})
+    return sorted({name.partition(LINK_SEPARATOR)[0] for name in planning_scene_objects(SERVICE_TIMEOUT_S)})
 
 
 def object_series(prefix: str, names: Iterable[str]) -> list[str]:

@@ -44,6 +44,22 @@ def remove_deleted_objects(remove_missing: Callable[[Collection[str]], list[str]
         rospy.loginfo("%s: '%s' is no longer in the simulation and was removed", store, removed)
 
 
+def planning_scene_objects(timeout_s: float) -> list[str]:
+    """Returns the IDs of all objects of the planning scene, of attached objects too.
+
+    Args:
+        timeout_s: Maximum wait for the service, and then for its response [s].
+
+    Raises:
+        CallError: move_group does not answer.
+    """
+    components = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=components))
+    scene = request_service("get_planning_scene", GetPlanningScene, request, timeout_s).scene
+    ids = [item.id for item in scene.world.collision_objects]
+    return ids + [item.object.id for item in scene.robot_state.attached_collision_objects]
+
+
 def new_movable_objects(excluded_ids: Collection[str]) -> list[str]:
     """Returns the objects of the planning scene that are movable models of the simulation.
 
@@ -61,17 +77,11 @@ def new_movable_objects(excluded_ids: Collection[str]) -> list[str]:
     """
     if rospy.get_param(SIMULATION_PARAMETER, False) is not True:
         return []
-    get_scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
     get_properties = rospy.ServiceProxy("gazebo/get_model_properties", GetModelProperties)
-    for proxy in (get_scene, get_properties):
-        wait_for_service(proxy, SERVICE_TIMEOUT_S)
-    components = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
-    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=components))
-    scene = call_service(get_scene, request, SERVICE_TIMEOUT_S).scene
-    ids = [item.id for item in scene.world.collision_objects]
-    ids += [item.object.id for item in scene.robot_state.attached_collision_objects]
+    names = planning_scene_objects(SERVICE_TIMEOUT_S)
+    wait_for_service(get_properties, SERVICE_TIMEOUT_S)
     movable = []
-    for name in ids:
+    for name in names:
         model, separator, _link = name.rpartition(LINK_SEPARATOR)
         if separator and name not in excluded_ids:
             properties_request = GetModelPropertiesRequest(model_name=model)
