@@ -28,8 +28,8 @@ class NextInTower(FrameworkState):
 
     def __init__(self, prefix: str, **keys: Unpack[StateKeys]) -> None:
         super().__init__(**keys)
-        self._prefix, self._left = str(prefix), list[tuple[str, str]]()
-        self._has_begun = False
+        self._prefix = str(prefix)
+        self._left: list[tuple[str, str]] | None = None  # None before the first object of a tower
 
     def execute(self, userdata: Any) -> str:
         """Selects the next object and its support."""
@@ -37,14 +37,13 @@ class NextInTower(FrameworkState):
         if missing:
             return self.fail(f"the output keys lack {', '.join(sorted(missing))}; add them, or the names are lost")
         try:
-            if not self._has_begun:
+            if self._left is None:
                 names = object_series(self._prefix, scene_objects())
                 self._left = list(zip(names[1:], names, strict=False))
-                self._has_begun = True
         except (CallError, SeriesError) as error:
             return self.fail(str(error))
         if not self._left:
-            self._has_begun = False
+            self._left = None
             return self.end(self.outcomes[1], f"the tower of '{self._prefix}' has no further object")
         userdata.selected_object, userdata.selected_support = self._left.pop(0)
         return self.succeed()
