@@ -17,6 +17,7 @@ from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUN
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA, SuccessCriteria
 from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, Region
+from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, PlacedObject, SettingsError
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
@@ -153,10 +154,14 @@ class TaskSettings(EpisodeSettings):
         """Returns the name of the first object that a predicate wants lifted or held; "" for none."""
         if self.success.is_pick:
             return ""
+        return next((item.object for item in self.conditions if isinstance(item, Lifted | HeldFor)), "")
+
+    @property
+    def conditions(self) -> list[Condition]:
+        """Returns the conditions of success and milestones."""
         required = self.success.required
         predicates = [*([required] if required is not None else []), *(each.predicate for each in self.progress)]
-        conditions = [condition for predicate in predicates for condition in predicate.conditions]
-        return next((item.object for item in conditions if isinstance(item, Lifted | HeldFor)), "")
+        return [condition for predicate in predicates for condition in predicate.conditions]
 
     @property
     def has_milestones(self) -> bool:

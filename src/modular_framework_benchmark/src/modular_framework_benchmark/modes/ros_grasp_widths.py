@@ -12,7 +12,6 @@ from modular_framework_benchmark.experiments.model_sizes import longest_side, si
 from modular_framework_benchmark.experiments.scene_objects import SceneObject
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.predicates.conditions import Stacked
-from modular_framework_benchmark.predicates.predicate import Predicate
 from modular_framework_core.commander.robot_groups import RobotModelError, read_group
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometryError,
@@ -52,10 +51,8 @@ def grasp_width_faults(
 
 def _stacked_names(settings: TaskSettings) -> set[str]:
     """Returns the names of the objects that must be put on others."""
-    found: list[Predicate] = [milestone.predicate for milestone in settings.progress]
-    found += [settings.success.required] if settings.success.required is not None else []
-    conditions = [condition for predicate in found for condition in predicate.conditions]
-    return {name for condition in conditions if isinstance(condition, Stacked) for name in condition.objects[1:]}
+    stacked = [condition for condition in settings.conditions if isinstance(condition, Stacked)]
+    return {name for condition in stacked for name in condition.objects[1:]}
 
 
 def _width(item: SceneObject) -> float:
