@@ -49,7 +49,7 @@ class SceneObject:
         pose: Distributions of x, y, z [m] and roll, pitch, yaw [rad] in the world frame; without z the object rests on
             a surface.
         surface: Distribution of the surface height [m]; None if z is given.
-        size: Distribution of the length of the longest side [m]; None for the model as it is.
+        size: Distribution of the length of the longest side [m]; None for the size of the model file.
         spacing_m: Smallest horizontal distance between the object's frame and the frames of the objects before it [m].
         node: Mapping of the file, for faults.
     """
@@ -94,7 +94,7 @@ class SceneObject:
 def sampled_scene(objects: Sequence[SceneObject], key: tuple[object, ...]) -> tuple[PlacedObject, ...]:
     """Returns the objects of a trial with their poses.
 
-    A pose that is too near to the objects before it is drawn again. If no pose is found, the scene begins anew.
+    A pose that is too near to the objects before it is drawn again. If no pose is found, all objects are drawn again.
 
     Args:
         objects: Objects in their order.

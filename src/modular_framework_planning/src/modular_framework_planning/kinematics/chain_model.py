@@ -33,9 +33,8 @@ def joint_tree(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:
     zeros = np.zeros(pin_model.nq)
     axes, prismatic = [], []
     for joint_id in joint_ids:  # a joint's column of its own Jacobian is its axis, linear above angular
-        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(
-            6, -1
-        )  # one-dimensional for a tree with one joint
+        # Pinocchio returns a one-dimensional array for a tree with one joint.
+        jacobian = pin.computeJointJacobian(pin_model, data, zeros, joint_id).reshape(6, -1)
         column = jacobian[:, pin_model.joints[joint_id].idx_v]
         prismatic.append(bool(np.linalg.norm(column[:3]) > 0.5))
         axes.append(column[:3] if prismatic[-1] else column[3:])

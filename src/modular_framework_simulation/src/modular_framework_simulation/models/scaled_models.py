@@ -15,7 +15,7 @@ UNSCALABLE = ("include", "joint", "plugin", "sensor")
 
 
 def read_scaled(file: Path, factor: float | None) -> str:
-    """Returns the text of a model's file, scaled by a factor; None for the model as it is.
+    """Returns the text of a model's file, scaled by a factor; None for no scaling.
 
     Args:
         file: SDF file of a model.

@@ -67,7 +67,7 @@ def _object_of_method(service: str, name: str) -> Iterator[None]:
 
     Args:
         service: Service of the method.
-        name: Object; "" to leave the parameter as it is.
+        name: Object; "" to leave the parameter unchanged.
 
     Raises:
         CallError: No node offers the service.
