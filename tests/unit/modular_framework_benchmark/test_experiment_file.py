@@ -73,7 +73,10 @@ def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_pa
 
     expected = poses(PICK)
     assert poses(yaml.safe_dump(yaml.safe_load(PICK))) == expected
-    assert poses(PICK.replace("rests_at: 0.8", "on: 0.8")) == expected
+    old = PICK.replace("rests_at: 0.8", "on: 0.8")
+    assert poses(old) == expected
+    with pytest.raises(ExperimentFault, match=r"experiment\.yaml:36:3: .* PyYAML writes this for the keys on and"):
+        read(yaml.safe_dump(yaml.safe_load(old)), tmp_path)
 
 
 def test_pyyaml_keeps_the_names_of_predicates_and_the_shipped_experiments() -> None:

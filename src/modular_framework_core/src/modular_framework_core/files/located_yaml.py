@@ -299,5 +299,9 @@ class _Reader:
     def _key(self, value: Node) -> str | None:
         if isinstance(value, Scalar) and isinstance(value.value, str) and value.value:
             return value.value
-        self._faults.add(value.location, f"a key must be text, found {kind_of(value)}; put it in quotes")
+        advice = "put it in quotes"
+        if isinstance(value, Scalar) and isinstance(value.value, bool):
+            names = "on and yes" if value.value else "off and no"
+            advice = f"PyYAML writes this for the keys {names}; write the original key in quotes"
+        self._faults.add(value.location, f"a key must be text, found {kind_of(value)}; {advice}")
         return None
