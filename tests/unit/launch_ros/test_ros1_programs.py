@@ -150,6 +150,19 @@ arm:
     assert (values["/arm/gains/a/p"], values["/arm/gains/a/d"], values["/arm/velocity_ff/a"]) == (10.0, 1.0, 0.5)
 
 
+def test_an_interpolation_that_ros_1_lacks_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "ros2_controllers.yaml").write_text(
+        CONTROLLERS.replace("[position],", "[position], interpolation_method: none,").replace(
+            "[velocity, position]", "[velocity, position], interpolation_method: splines"
+        )
+    )
+    path = str(tmp_path / "ros2_controllers.yaml")
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
+    assert not [name for name in context.parameters.values() if "interpolation" in name]
+    (line,) = [each for each in capsys.readouterr().out.splitlines() if "interpolation_method" in each]
+    assert "controller arm: interpolation_method none has no effect" in line
+
+
 def test_a_velocity_that_no_state_interface_gives_is_not_checked(tmp_path: Path) -> None:
     (tmp_path / "ros2_controllers.yaml").write_text(
         CONTROLLERS.replace("[position],", "[position], state_interfaces: [position],")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from launch.core.errors import LaunchError
+from launch.core.screen_log import get_logger
 
 from launch_ros.namespaces import full_name, join
 from launch_ros.node_parameters import (
@@ -62,9 +63,17 @@ JOINT_COMMANDS = {
     ("acceleration", "position", "velocity"): JointCommands("PosVelAccJointInterface", "pos_vel_acc_controllers"),
 }
 """Names in ros_control, by sorted ROS 2 command interfaces of a joint."""
-CONVERTED_PARAMETERS = ("command_interfaces", "state_interfaces", "interface_name", "open_loop_control")
+CONVERTED_PARAMETERS = (
+    "command_interfaces",
+    "state_interfaces",
+    "interface_name",
+    "interpolation_method",
+    "interpolate_from_desired_state",
+    "open_loop_control",
+)
 """Parameters of ROS 2 controllers that select the type and the constraints in ROS 1, or that describe what ROS 1 always
-does: with `open_loop_control`, motions start at the last commanded positions."""
+does: with `open_loop_control`, now `interpolate_from_desired_state`, motions start at the last commanded positions, and
+the `interpolation_method` is `splines`."""
 
 
 def source_of(path: str) -> ParameterSource:
@@ -144,6 +153,13 @@ def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[
             types |= {name: str(value["type"]) for name, value in own.items()}
             if not own and "*" not in pattern:
                 merge(found.setdefault(pattern.rpartition("/")[2], {}), inner)
+    for name, parameters in found.items():
+        if name in types and parameters.get("interpolation_method", "splines") != "splines":
+            get_logger().warning(
+                "controller %s: interpolation_method %s has no effect; ROS 1 always interpolates with splines",
+                name,
+                parameters["interpolation_method"],
+            )
     return {name: _ros1_parameters(found.get(name, {}), type_name) for name, type_name in types.items()}
 
 
