@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -50,3 +51,15 @@ def ros_launch(ros_session: RosSession) -> Callable[..., RosSession]:
         return ros_session
 
     return launch
+
+
+@pytest.fixture(scope="module")
+def screen() -> Iterator[str]:
+    """A new X server without a monitor; its display name."""
+    reading, writing = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-nolisten", "tcp"], pass_fds=[writing])
+    os.close(writing)
+    with os.fdopen(reading) as answer:
+        yield f":{answer.readline().strip()}"
+    server.terminate()
+    server.wait(20.0)

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -97,26 +96,14 @@ def test_a_source_may_be_the_topic_that_the_node_publishes(window: RosSession) -
         other.unregister()
 
 
-@pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    """A screen of its own."""
-    reading, writing = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-nolisten", "tcp"], pass_fds=[writing])
-    os.close(writing)
-    with os.fdopen(reading) as answer:
-        yield f":{answer.readline().strip()}"
-    server.terminate()
-    server.wait(20.0)
-
-
-def test_the_publisher_without_a_window_opens_one_for_use_gui(window: RosSession, display: str) -> None:
+def test_the_publisher_without_a_window_opens_one_for_use_gui(window: RosSession, screen: str) -> None:
     def titles() -> str:
-        command = ["xwininfo", "-root", "-tree", "-display", display]
+        command = ["xwininfo", "-root", "-tree", "-display", screen]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     states: list[JointState] = []
     subscriber = rospy.Subscriber("old/joint_states", JointState, states.append)
-    env = {**window.env, "DISPLAY": display}
+    env = {**window.env, "DISPLAY": screen}
     for use_gui in ("false", "true"):
         states.clear()
         command = [executable("joint_state_publisher", "joint_state_publisher"), "__ns:=old", f"_use_gui:={use_gui}",
