@@ -20,7 +20,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
-from modular_framework_testing.simulation.law_trials import bounce_box, heavy_on_light, roll_ball, roll_cylinder, top
+from modular_framework_testing.simulation.law_trials import TRIALS, heavy_on_light, stack
 from modular_framework_testing.simulation.simulated_samples import jointed, lift_robot_urdf, run, solid
 
 GRAVITY = 9.81
@@ -148,11 +148,13 @@ def test_the_less_bouncy_surface_decides_and_a_bouncing_ball_comes_to_rest(world
     assert abs(body.state().twist.linear[2]) < 0.02
 
 
-@pytest.mark.parametrize("trial", [roll_cylinder, roll_ball, bounce_box, top, heavy_on_light])
+@pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.__name__)
 def test_laws_that_benchmarks_compare_hold_within_three_percent(
-    make_world: MakeWorld, trial: Callable[[MakeWorld], Any]
+    make_world: MakeWorld, trial: Callable[..., Any]
 ) -> None:
-    assert trial(make_world).error < 0.03
+    """A stack that does not hold is seen within the first second; the benchmark simulates more."""
+    shorter = {"seconds": 1.0} if trial in (stack, heavy_on_light) else {}
+    assert trial(make_world, **shorter).error < 0.03
 
 
 @pytest.mark.parametrize("kp", [2e3, 2e4])

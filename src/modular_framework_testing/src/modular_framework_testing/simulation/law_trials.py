@@ -225,21 +225,31 @@ def top(make: MakeWorld) -> Outcome:
     return Outcome(turned / seconds, rate)
 
 
-def stack(make: MakeWorld) -> Outcome:
-    """Ten cubes on each other stand: the highest has its height after ten seconds, to a fraction of one cube."""
+def stack(make: MakeWorld, seconds: float = 10.0) -> Outcome:
+    """Ten cubes on each other stand: the highest keeps its position, to a fraction of one cube.
+
+    Args:
+        make: Makes a world with a floor.
+        seconds: Simulated time [s].
+    """
     world, side = make(), 0.05
     bodies = [world.spawn(box(f"cube_{n}", side, Pose((0, 0, side * (n + 0.5))))) for n in range(10)]
-    run(world, 10.0)
+    run(world, seconds)
     x, y, z = bodies[-1].state().pose.position
     return Outcome(side - math.dist((x, y, z), (0, 0, 9.5 * side)), side)
 
 
-def heavy_on_light(make: MakeWorld) -> Outcome:
-    """A body of 100 kg stands on a body of 0.1 kg: their heights after five seconds."""
+def heavy_on_light(make: MakeWorld, seconds: float = 5.0) -> Outcome:
+    """A body of 100 kg stands on a body of 0.1 kg: both keep their positions, to a fraction of their sides.
+
+    Args:
+        make: Makes a world with a floor.
+        seconds: Simulated time [s].
+    """
     world, side = make(), 0.1
     light = world.spawn(box("light", side, Pose((0, 0, side / 2)), mass=0.1))
     heavy = world.spawn(box("heavy", side, Pose((0, 0, 1.5 * side)), mass=100.0))
-    run(world, 5.0)
+    run(world, seconds)
     off = max(
         math.dist(body.state().pose.position, (0, 0, height))
         for body, height in ((light, 0.5 * side), (heavy, 1.5 * side))
