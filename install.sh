@@ -128,18 +128,25 @@ get_root_rights() {  # purpose, command for an administrator
   [ -z "$reason" ] || fail "$1 needs root rights, and $reason" "$remedy"
 }
 
+# Prints the first file or folder of another user, below these, that this user may not write to.
+first_locked() {  # path...
+  find "$@" ! -user "$(id -u)" ! -writable ! -type l -print -quit 2>/dev/null || true
+}
+
 # An earlier run as root leaves files behind that this user may not write to.
 check_owner() {
-  local path
-  if [ -e "$ROOT/logs" ] && [ ! -w "$ROOT/logs" ]; then
-    path="logs_of_$(stat -c %U "$ROOT/logs")_$(date +%s)"
-    mv "$ROOT/logs" "$ROOT/$path" || fail "you may not write to $ROOT/logs" "sudo chown -R $(id -un) $ROOT"
-    say "You may not write to the folder logs. It is now $path, and new output goes into a new folder logs."
+  local path owner name
+  path=$(first_locked "$ROOT/logs")
+  if [ -n "$path" ]; then
+    owner=$(stat -c %U "$path")
+    name="logs_of_${owner}_$(date +%s)"
+    mv "$ROOT/logs" "$ROOT/$name" || fail "you may not write to $ROOT/logs" "sudo chown -R $(id -un) $ROOT"
+    say "You may not write to files of $owner in the folder logs. It is now $name, and new output goes into a new folder logs."
   fi
-  for path in "$ROOT" "$VENV" "$ROOT/build" "$ROOT/devel"; do
-    [ ! -e "$path" ] || [ -w "$path" ] ||
-      fail "$path belongs to $(stat -c %U "$path"), and you may not write to it" "sudo chown -R $(id -un) $ROOT"
-  done
+  path=$(first_locked "$ROOT" "$VENV" -maxdepth 0)
+  [ -n "$path" ] || path=$(first_locked "$ROOT/build" "$ROOT/devel" "$ROOT"/.*_cache)
+  [ -z "$path" ] ||
+    fail "$path belongs to $(stat -c %U "$path"), and you may not write to it" "sudo chown -R $(id -un) $ROOT"
 }
 
 # A bare root (a chroot, say) may lack what every running system has and the build, roslaunch and shells need.

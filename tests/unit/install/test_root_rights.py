@@ -147,18 +147,36 @@ def of_two_users(tmp_path: Path) -> Path:
     return folder
 
 
-def test_logs_of_root_are_set_aside_with_a_word(of_two_users: Path) -> None:
-    (of_two_users / "logs" / "install.log").write_text("of root")
+@pytest.mark.parametrize("of_user", [[], ["logs"], ["logs", "logs/tests"]], ids=["folder", "inner folder", "file"])
+def test_logs_of_root_are_set_aside_with_a_word(of_two_users: Path, of_user: list[str]) -> None:
+    """A run as root after one of the user leaves files of root in folders of the user."""
+    (of_two_users / "logs" / "tests").mkdir()
+    (of_two_users / "logs" / "tests" / "lint.log").write_text("of root")
+    for name in of_user:
+        os.chown(of_two_users / name, 65534, 65534)
     answer = check_owner(of_two_users)
     assert answer.returncode == 0, answer.stderr
-    assert "You may not write to the folder logs. It is now logs_of_root_" in answer.stdout
+    assert "You may not write to files of root in the folder logs. It is now logs_of_root_" in answer.stdout
     (aside,) = of_two_users.glob("logs_of_root_*")
-    assert (aside / "install.log").read_text() == "of root" and (of_two_users / "logs" / "install.log").exists()
+    assert (aside / "tests" / "lint.log").read_text() == "of root"
+    assert (of_two_users / "logs" / "install.log").exists()
 
 
-@pytest.mark.parametrize("name", [".venv", "build", "devel"])
+def test_logs_of_the_user_stay_where_they_are(of_two_users: Path) -> None:
+    (of_two_users / "logs" / "latest").symlink_to("/no/such/folder")
+    (of_two_users / "logs" / "install.log").write_text("of the user")
+    for path in (of_two_users / "logs", of_two_users / "logs" / "install.log"):
+        os.chown(path, 65534, 65534)
+    answer = check_owner(of_two_users)
+    assert (answer.returncode, answer.stdout) == (0, ""), answer.stderr
+    assert (of_two_users / "logs" / "install.log").read_text() == "of the user"
+
+
+@pytest.mark.parametrize("name", [".venv", "build", "devel", "devel/lib", ".ruff_cache"])
 def test_a_build_of_root_is_named_with_what_to_do(of_two_users: Path, name: str) -> None:
-    (of_two_users / name).mkdir()
+    (of_two_users / name).mkdir(parents=True)
+    if "/" in name:
+        os.chown((of_two_users / name).parent, 65534, 65534)
     os.chown(of_two_users / "logs", 65534, 65534)
     answer = check_owner(of_two_users)
     assert answer.returncode == 1
