@@ -12,6 +12,7 @@ KEPT_OPTIONS="nvidia image workspace device usb real_time headless" # of a conta
 GRAPHICS_DEVICE=${GRAPHICS_DEVICE:-/dev/dri}
 LATENCY_DEVICE=${LATENCY_DEVICE:-/dev/cpu_dma_latency}
 NVIDIA_DRIVER=${NVIDIA_DRIVER:-/proc/driver/nvidia/version}
+WSL_DRIVER=${WSL_DRIVER:-/usr/lib/wsl/lib/nvidia-smi}
 USB_FOLDER=${USB_FOLDER:-/dev/bus/usb}
 USER_ID=${SUDO_UID:-$(id -u)} # whom the files in a workspace belong to
 [ "$USER_ID" != 0 ] || USER_ID=1000
@@ -209,14 +210,28 @@ check_engine() {  # arguments of this script...
 user to the group docker (sudo usermod -aG docker $(id -un)) and log in again"
 }
 
-# Docker itself says only "could not select device driver" if the toolkit is missing.
-check_nvidia() {
+check_nvidia_driver() {
   [ "$nvidia" = true ] || return 0
-  [ -e "$NVIDIA_DRIVER" ] || fail "nvidia is true, but no Nvidia driver is loaded on this computer (no $NVIDIA_DRIVER)" \
-    "install the driver of the graphics card, or give nvidia=false"
-  command -v nvidia-container-runtime-hook >/dev/null || command -v nvidia-ctk >/dev/null ||
-    fail "nvidia is true, but the Nvidia container toolkit is missing" "install the package nvidia-container-toolkit as its \
-manual says, run 'sudo nvidia-ctk runtime configure --runtime=docker && sudo systemctl restart docker', or give nvidia=false"
+  [ -e "$NVIDIA_DRIVER" ] || [ -e "$WSL_DRIVER" ] ||
+    fail "nvidia is true, but no Nvidia driver is loaded on this computer (no $NVIDIA_DRIVER)" \
+      "install the driver of the graphics card (with WSL 2: in Windows), or give nvidia=false"
+}
+
+# Starts a container of an empty image with the GPU. The engine refuses it without the container toolkit and with one that
+# it does not use, which neither the programs that are installed nor its list of runtimes tell.
+check_engine_hands_over_gpu() {
+  local probe answer
+  [ "$nvidia" = true ] || return 0
+  probe=$(tar -c --files-from /dev/null | docker import - 2>/dev/null) || return 0
+  answer=$(docker run --rm --gpus all "$probe" /none 2>&1) || true # there is no program to run
+  docker image rm "$probe" >/dev/null 2>&1 || true
+  case $answer in
+    *"could not select device driver"*)
+      fail "nvidia is true, but Docker cannot hand over a GPU: its Nvidia container toolkit is missing or not in use" \
+        "install the package nvidia-container-toolkit as its manual says, run 'sudo nvidia-ctk runtime configure \
+--runtime=docker && sudo systemctl restart docker', or give nvidia=false"
+      ;;
+  esac
 }
 
 # ---- image
@@ -326,6 +341,7 @@ replace_container() {
     check_made_here
     check_not_running "it cannot be replaced"
   fi
+  check_engine_hands_over_gpu
   prepare_image
   [ -z "$workspace" ] || check_user_of_image
   if container_exists; then docker rm "$container_name" >/dev/null; fi
@@ -359,7 +375,7 @@ set_launch_arguments() {
 main() {
   read_arguments "$@"
   check_values
-  check_nvidia
+  check_nvidia_driver
   check_engine "$@"
   if [ "$reinstall" = false ] && container_exists; then
     check_same_options

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from deployer import CONTAINER_USER, STAND_IN, Deployer, add_command  # noqa: E402
+from deployer import CONTAINER_USER, STAND_IN, Deployer  # noqa: E402
 
 
 @pytest.fixture
@@ -18,7 +18,6 @@ def docker(tmp_path: Path) -> Deployer:
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "docker").write_text(STAND_IN.read_text())
     (tmp_path / "bin" / "docker").chmod(0o755)
-    add_command(tmp_path / "bin", "nvidia-ctk", "exit 0")
     return Deployer(tmp_path)
 
 

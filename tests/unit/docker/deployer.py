@@ -42,6 +42,7 @@ class Deployer:
             **own,
             "GRAPHICS_DEVICE": "/no/graphics",
             "NVIDIA_DRIVER": "/dev/null",
+            "WSL_DRIVER": "/no/driver",
             "XDG_CACHE_HOME": f"{self.folder}/cache",
             **self.env,
         }

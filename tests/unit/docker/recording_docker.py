@@ -3,7 +3,8 @@
 """A docker command for tests: records each call and remembers which image and container there are.
 
 The folder $STAND_IN holds calls.jsonl (one call a line), copied (what was copied into the container), image.json,
-container.json, off (as long as the engine does not answer) and exit_code (of the container).
+container.json, off (as long as the engine does not answer), no_gpu (while the engine cannot hand one over) and
+exit_code (of the container).
 """
 
 from __future__ import annotations
@@ -76,6 +77,15 @@ def answer(arguments: list[str]) -> int:
             return int(read(f"{FOLDER}/exit_code")) if os.path.exists(f"{FOLDER}/exit_code") else 0
         case ["image", "rm", _]:
             pass
+        case ["import", "-"]:
+            print("sha256:empty")
+        case ["run", "--rm", "--gpus", "all", "sha256:empty", program]:
+            no_gpu = os.path.exists(f"{FOLDER}/no_gpu")
+            reason = (
+                'could not select device driver "" with capabilities: [[gpu]]' if no_gpu else f"{program}: no such file"
+            )
+            print(f"docker: Error response from daemon: {reason}.", file=sys.stderr)
+            return 125 if no_gpu else 127
         case _:
             raise SystemExit(f"docker has no such call: {arguments}")
     return 0

@@ -38,19 +38,26 @@ def test_starts_an_existing_container_again(docker: Deployer) -> None:
 def test_hands_over_the_gpu_only_when_asked(docker: Deployer) -> None:
     assert docker.run("container_name=mbf", "nvidia=true").returncode == 0
     assert "--gpus all" in docker.calls("create")[0]
+    assert docker.calls("image rm") == ["image rm sha256:empty"], "the image of the check is gone"
 
 
 @pytest.mark.parametrize(
-    ("driver", "missing"), [("/no/driver", "no Nvidia driver is loaded"), ("/dev/null", "container toolkit is missing")]
+    ("driver", "missing"),
+    [("/no/driver", "no Nvidia driver is loaded"), ("/dev/null", "toolkit is missing or not in use")],
 )
 def test_a_gpu_that_docker_cannot_hand_over_is_refused_before_the_build(
     docker: Deployer, driver: str, missing: str
 ) -> None:
     docker.env = {"NVIDIA_DRIVER": driver}
-    (docker.folder / "bin" / "nvidia-ctk").unlink()
+    (docker.folder / "no_gpu").touch()
     answer = docker.run("container_name=mbf", "nvidia=true")
     assert answer.returncode == 1 and missing in answer.stderr and "give nvidia=false" in answer.stderr
     assert not docker.calls("build") and not docker.calls("create")
+
+
+def test_the_driver_may_be_that_of_windows(docker: Deployer) -> None:
+    docker.env = {"NVIDIA_DRIVER": "/no/driver", "WSL_DRIVER": "/dev/null"}
+    assert docker.run("container_name=mbf", "nvidia=true").returncode == 0
 
 
 def test_an_argument_of_the_launch_file_with_one_sign_is_named_as_such(docker: Deployer) -> None:
