@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +18,23 @@ ROOT = Path(__file__).resolve().parents[3]
 STARTS_A_PROGRAM = """
 import workspace
 import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
+print(child.pid, flush=True)
+time.sleep(600)
+"""
+
+ENDS_SLOWLY = """
+import workspace
+import subprocess, sys, time
+from modular_framework_core.launching import launch_session
+kill = launch_session.kill_processes_with
+
+def ask_first(*arguments, **options):
+    print("ends", flush=True)
+    sys.stdin.readline()
+    return kill(*arguments, **options)
+
+launch_session.kill_processes_with = ask_first
 child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
 print(child.pid, flush=True)
 time.sleep(600)
@@ -84,13 +103,59 @@ def test_a_spawned_process_ends_without_a_traceback(number: signal.Signals, tmp_
     assert printed == "interrupted\n"
 
 
-def test_help_needs_no_sourced_shell() -> None:
-    bare = {name: os.environ[name] for name in ("HOME",)}
-    printed = subprocess.run(
-        [ROOT / "benchmarks" / "planning", "--help"],
-        env={**bare, "PATH": "/usr/local/bin:/usr/bin:/bin"},
+def test_a_second_interrupt_does_not_save_what_a_benchmark_started() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", ENDS_SLOWLY],
+        env={**os.environ, "PYTHONPATH": f"{ROOT / 'benchmarks'}:{os.environ['PYTHONPATH']}"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as benchmark:
+        assert benchmark.stdin is not None and benchmark.stdout is not None
+        child = psutil.Process(int(benchmark.stdout.readline()))
+        benchmark.send_signal(signal.SIGINT)
+        assert benchmark.stdout.readline() == "ends\n"
+        benchmark.send_signal(signal.SIGINT)
+        benchmark.stdin.write("go on\n")
+        benchmark.stdin.flush()
+    assert psutil.wait_procs([child], 30.0) == ([child], [])
+
+
+def help_of(folder: Path) -> str:
+    """Returns what `planning --help` prints in a shell without the workspace."""
+    return subprocess.run(
+        [folder / "benchmarks" / "planning", "--help"],
+        env={"HOME": os.environ["HOME"], "PATH": "/usr/local/bin:/usr/bin:/bin"},
         stdout=subprocess.PIPE,
         text=True,
         check=True,
     ).stdout
-    assert "--planner PLANNER" in printed
+
+
+def test_help_needs_no_sourced_shell() -> None:
+    assert "--planner PLANNER" in help_of(ROOT)
+
+
+def test_help_in_a_clone_without_a_build_sets_nothing_up(tmp_path: Path) -> None:
+    (tmp_path / "benchmarks").mkdir()
+    for name in ("planning", "workspace.py"):
+        shutil.copy(ROOT / "benchmarks" / name, tmp_path / "benchmarks" / name)
+    (tmp_path / "install.sh").write_text("#!/bin/sh\necho set-up; exit 1\n")
+    (tmp_path / "install.sh").chmod(0o755)
+    printed = help_of(tmp_path)
+    assert "benchmarks/planning" in printed and "./install.sh sets the framework up" in printed
+    assert "set-up" not in printed
+
+
+def test_every_benchmark_enters_the_workspace_before_anything_else() -> None:
+    programs = [path for path in (ROOT / "benchmarks").iterdir() if path.is_file() and os.access(path, os.X_OK)]
+    assert len(programs) > 30
+    for program in programs:
+        statements = ast.parse(program.read_text()).body
+        imported = [
+            statement.module if isinstance(statement, ast.ImportFrom) else statement.names[0].name
+            for statement in statements
+            if isinstance(statement, ast.Import | ast.ImportFrom)
+        ]
+        assert [name for name in imported if name != "__future__"][0] == "workspace", program
