@@ -724,6 +724,7 @@ def test_the_node_has_everything_of_gazebo_ros_and_the_table_leaves_nothing_out(
     published, subscribed, services = rosgraph.Master("/test").getSystemState()
     own = {name for name, nodes in services if "/gazebo" in nodes}
     additions = {"hold_time", "advance_time", "step_time", "restart", "referee", "record_world"}
+    additions |= {"set_perceived_pose_error"}
     assert own == {f"/gazebo/{name}" for name in (*SERVICES, *additions)}
     topics = {name for name, nodes in (*published, *subscribed) if "/gazebo" in nodes and name.startswith("/gazebo/")}
     own_topics = ("grasped_object", "visible_models", "visible_poses")

@@ -8,22 +8,25 @@ from modular_framework_simulation.gazebo_ros.joint_services import JointServices
 from modular_framework_simulation.gazebo_ros.light_services import LightServices
 from modular_framework_simulation.gazebo_ros.link_services import LinkServices
 from modular_framework_simulation.gazebo_ros.model_services import ModelServices
+from modular_framework_simulation.gazebo_ros.perception_service import PerceptionService
 from modular_framework_simulation.gazebo_ros.physics_services import PhysicsServices
+from modular_framework_simulation.loop.perception_errors import PerceptionErrors
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 from modular_framework_simulation.models.sdf_resources import Resources
 
 
 class GazeboServices:
-    """Serves all names of gazebo_ros below /gazebo.
+    """Serves all names of gazebo_ros below /gazebo, and the service for errors of perception.
 
-    See `ModelServices`, `LinkServices`, `JointServices`, `PhysicsServices` and `LightServices`.
+    See `ModelServices`, `LinkServices`, `JointServices`, `PhysicsServices`, `LightServices` and `PerceptionService`.
 
     Args:
         loop: Loop with the world and the pacer.
         resources: Folders and packages for the files of spawned models.
+        perception: Displacements of models in the planning scene.
     """
 
-    def __init__(self, loop: SimulationLoop, resources: Resources) -> None:
+    def __init__(self, loop: SimulationLoop, resources: Resources, perception: PerceptionErrors) -> None:
         self._endpoints = Endpoints(loop)
         self._physics = PhysicsServices(loop)
         self._groups = (
@@ -31,6 +34,7 @@ class GazeboServices:
             LinkServices(loop.world),
             JointServices(loop.world),
             LightServices(),
+            PerceptionService(perception),
             self._physics,
         )
 

@@ -55,6 +55,8 @@ RESTART = "/gazebo/restart"
 STATE_DIGEST = "/gazebo/state_digest"
 REFEREE = "/gazebo/referee"
 RECORD_WORLD = "/gazebo/record_world"
+SET_PERCEIVED_POSE_ERROR = "/gazebo/set_perceived_pose_error"
+"""Service that displaces a model in the planning scene."""
 READ_ONLY_PREFIX = "/get_"
 """Part of the names of services that do not change the world."""
 

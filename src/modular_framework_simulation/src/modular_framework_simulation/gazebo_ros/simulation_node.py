@@ -24,6 +24,7 @@ from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.gazebo_ros.ros_names import RESTART
 from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, noise_seed
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
 from modular_framework_simulation.gazebo_ros.time_services import TimeServices
@@ -31,6 +32,7 @@ from modular_framework_simulation.gazebo_ros.visible_scene_topics import Visible
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics, init_node
 from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.perception_errors import PerceptionErrors
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.simulation_loop import Actors, Hook, SimulationLoop
 from modular_framework_simulation.loop.snapshots import WorldSnapshot, take_snapshot
@@ -58,7 +60,7 @@ _CAMERA_RATE_HZ = 500
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
-_STOP_TIMEOUT_S = 5.0
+_STOP_TIMEOUT_S, _RESPONSE_TIMEOUT_S = 5.0, 30.0
 
 
 def _pacer(parameters: Mapping[str, Any], requests: RequestQueue) -> Pacer:
@@ -104,7 +106,8 @@ class SimulationNode:
         if parameters["~paused"]:
             self._loop.pause()
         self._visible = VisibleSceneTopics(self._world, lambda: self._loop.paused) if self._topics else None
-        self._services = GazeboServices(self._loop, self._resources)
+        self._perception = PerceptionErrors()
+        self._services = GazeboServices(self._loop, self._resources, self._perception)
         self._scene = PlanningScenePublisher()
         self._last_snapshot: WorldSnapshot | None = None
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters["~state_digest"] else None
@@ -114,7 +117,7 @@ class SimulationNode:
             self._snapshot,
             may_hold=parameters["/wait_for_planning"],
             digest=digest,
-            after_restart=self._services.refresh,
+            after_restart=self._after_restart,
         )
         self._sensors, self._cameras = self._build_sensors(parameters, actors)
         self._add_hooks(parameters["~pub_clock_frequency"])
@@ -235,10 +238,14 @@ class SimulationNode:
 
     def _publish_snapshot(self) -> None:
         self._last_snapshot = take_snapshot(self._world, self._loop.held_objects(), self._last_snapshot)
-        self._scene.show(self._last_snapshot)
+        self._scene.show(self._perception.perceived(self._last_snapshot))
 
     def _snapshot(self) -> WorldSnapshot:
-        return take_snapshot(self._world, self._loop.held_objects())
+        return self._perception.perceived(take_snapshot(self._world, self._loop.held_objects()))
+
+    def _after_restart(self) -> None:
+        self._loop.requests.call(RESTART, self._perception.clear, _RESPONSE_TIMEOUT_S)
+        self._services.refresh()
 
     def _report_pace(self) -> None:
         if self._world.time_ns == 0:
