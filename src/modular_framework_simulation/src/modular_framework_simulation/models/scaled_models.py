@@ -42,30 +42,49 @@ def scaled_model(text: str, factor: float, where: str) -> str:
     Raises:
         DescriptionError: The text is not XML, or the model has parts that cannot be scaled.
     """
-    try:
-        root = parse(text, where)
-    except XmlError as error:
-        raise DescriptionError(error.where, error.found, error.allowed) from error
+    root = parsed_model(text, where)
     if found := next((name for name in UNSCALABLE if root.find(f".//{name}") is not None), ""):
         raise DescriptionError(where, f"got a <{found}>", "allowed in a model with a size: links and shapes alone")
     for mesh in root.iter("mesh"):
         if mesh.find("scale") is None:
             add_child(mesh, "scale").text = "1 1 1"
     for pose in root.iter("pose"):
-        _multiply(pose, factor, first=3)
+        multiply_numbers(pose, factor, first=3)
     for geometry in root.iter("geometry"):
         for element in geometry.iter():
             if element.tag in LENGTHS:
-                _multiply(element, factor)
+                multiply_numbers(element, factor)
     for inertial in root.iter("inertial"):
         for element in inertial.iter():
             if element.tag == "mass" or element.tag in MOMENTS:
-                _multiply(element, factor**3 if element.tag == "mass" else factor**5)
+                multiply_numbers(element, factor**3 if element.tag == "mass" else factor**5)
     return to_text(root)
 
 
-def _multiply(element: Element, factor: float, first: int | None = None) -> None:
-    """Multiplies the first numbers of an element, by default all numbers."""
+def parsed_model(text: str, where: str) -> Element:
+    """Returns the root element of a model's description.
+
+    Args:
+        text: SDF file of a model.
+        where: Name of the file, for errors.
+
+    Raises:
+        DescriptionError: The text is not XML.
+    """
+    try:
+        return parse(text, where)
+    except XmlError as error:
+        raise DescriptionError(error.where, error.found, error.allowed) from error
+
+
+def multiply_numbers(element: Element, factor: float, first: int | None = None) -> None:
+    """Multiplies the first numbers of an element.
+
+    Args:
+        element: Element whose text is a list of numbers.
+        factor: Factor.
+        first: Number of multiplied numbers; None for all.
+    """
     words = (element.text or "").split()
     count = len(words) if first is None else first
     element.text = " ".join([*(repr(float(word) * factor) for word in words[:count]), *words[count:]])
