@@ -12,9 +12,14 @@ from typing import Any
 import pytest
 import rospkg
 import rospy
-from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import DeleteModel, GetLinkProperties, GetModelState, GetWorldProperties, SetModelState
+from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
 
+from modular_framework_benchmark.episodes import ros_world
+from modular_framework_benchmark.records.episode_settings import PlacedObject
+from modular_framework_benchmark.records.perturbation import ObjectPerturbation
 from modular_framework_core import srv
 from modular_framework_core.scene.manage_object import parse_request, request_to_delete
 from modular_framework_core.scene.ros_manage_object import RefusedError, delete, spawn
@@ -127,3 +132,37 @@ def test_a_delete_that_fails_changes_nothing_anywhere(scene: FakePlanningScene) 
     assert matrix() == before
     delete(request_to_delete("box_5"))
     until(lambda: where(scene, "box_5") == NONE, "the object nowhere")
+
+
+def test_a_perturbed_object_has_its_mass_and_the_planning_scene_shows_it_displaced(scene: FakePlanningScene) -> None:
+    perturbed = ObjectPerturbation(mass=3.0, pose_error=(0.03, -0.04))
+    ros_world.spawn(PlacedObject("box_7", "cube", 0.1, 0.5, 0.891, scale=2.0, perturbed=perturbed))
+    found = call("/gazebo/get_link_properties", GetLinkProperties, "box_7::link")
+    # at constant density, the mass grows with the third power of the scale and the moments with the fifth
+    assert (found.mass, found.ixx) == pytest.approx((3 * 2**3 * 0.1, 3 * 2**5 * 4.16666667e-05))
+    until(lambda: "box_7__link" in scene.objects, "the object in the planning scene")
+    assert scene.objects["box_7__link"].primitives[0].dimensions == pytest.approx((0.1, 0.1, 0.1))
+
+    def difference() -> tuple[float, float, float]:
+        true = call("/gazebo/get_model_state", GetModelState, "box_7", "world").pose.position
+        seen = scene.poses["box_7__link"]
+        return seen.x - true.x, seen.y - true.y, seen.z - true.z
+
+    until(lambda: difference() == pytest.approx((0.03, -0.04, 0.0), abs=1.5e-3), "the displaced object")
+    delete_answer = call("/gazebo/delete_model", DeleteModel, "box_7")
+    assert delete_answer.success, delete_answer.status_message
+    until(lambda: "box_7__link" not in scene.objects, "the object gone")
+
+
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        (ModelState(), "the name of the model is empty"),
+        (ModelState(model_name="a", reference_frame="table"), "the reference frame is 'table'; allowed: world"),
+        (ModelState(model_name="a", pose=Pose(Point(), Quaternion(0, 0, 1, 0))), "the error has a rotation"),
+        (ModelState(model_name="a", pose=Pose(Point(float("nan"), 0, 0), Quaternion())), "position"),
+    ],
+)
+def test_a_wrong_error_of_perception_is_refused(scene: FakePlanningScene, state: ModelState, reason: str) -> None:
+    found = call("/gazebo/set_perceived_pose_error", SetModelState, state)
+    assert not found.success and reason in found.status_message

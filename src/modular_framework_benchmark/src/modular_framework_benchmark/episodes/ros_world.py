@@ -10,20 +10,24 @@ from typing import Any
 
 import rosgraph
 import rospy
-from gazebo_msgs.srv import SpawnModel
+from gazebo_msgs.msg import ModelState
+from gazebo_msgs.srv import SetModelState, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
 from modular_framework_benchmark.records.episode_settings import PlacedObject, model_file
+from modular_framework_benchmark.records.perturbation import ObjectPerturbation
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.changed_model import changed_model
 from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
-SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE = (
+SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE, PERCEPTION_SERVICE = (
     "/gazebo/spawn_sdf_model",
     "/gazebo/referee",
     "/gazebo/record_world",
+    "/gazebo/set_perceived_pose_error",
 )
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
 ABORTED_TIMEOUT_S = 5.0
@@ -36,15 +40,17 @@ class WorldError(RuntimeError):
 
 
 def spawn(placed: PlacedObject) -> None:
-    """Spawns an object in the world.
+    """Spawns an object with its perturbation in the world.
 
     Args:
         placed: Object with its pose.
 
     Raises:
-        WorldError: The model does not exist, or the simulation rejects it.
+        WorldError: The model does not exist or cannot be perturbed, or the simulation rejects it.
         CallError: The simulation does not answer.
     """
+    if placed.perturbed is not None and any(placed.perturbed.pose_error):
+        _displace_perceived(placed.name, placed.perturbed.pose_error)  # first, so that the true pose is never shown
     x, y, z, w = quaternion_from_rpy(*placed.rpy)
     pose = Pose(Point(*placed.xyz), Quaternion(x, y, z, w))
     request = SpawnModel._request_class(placed.name, _description(placed), "", pose, "world")
@@ -138,9 +144,27 @@ def _ask_simulation(service: str, kind: Any, request: Any, timeout_s: float) -> 
     return str(response.message)
 
 
+def _displace_perceived(name: str, error: tuple[float, ...]) -> None:
+    """Displaces an object in the planning scene.
+
+    Args:
+        name: Name of the object.
+        error: Perceived minus true position in the world frame, x and y [m].
+    """
+    state = ModelState(model_name=name, reference_frame="world")
+    state.pose.position.x, state.pose.position.y = error
+    request = SetModelState._request_class(state)
+    response = request_service(PERCEPTION_SERVICE, SetModelState, request, SERVICE_TIMEOUT_S)
+    if not response.success:
+        raise WorldError(f"object '{name}' cannot be displaced in the planning scene: {response.status_message}")
+
+
 def _description(placed: PlacedObject) -> str:
+    """Returns the SDF text of an object with its size and its perturbation."""
     path = model_file(placed.model, str(rospy.get_param("/gazebo_model_path", "")))
+    perturbed = placed.perturbed or ObjectPerturbation()
     try:
-        return read_scaled(path, placed.scale)
+        text = read_scaled(path, placed.scale)
+        return changed_model(text, str(path), mass=perturbed.mass, friction=perturbed.friction)
     except (OSError, DescriptionError) as error:
         raise WorldError(f"model '{placed.model}': {path} cannot be used: {error}; correct the name") from error

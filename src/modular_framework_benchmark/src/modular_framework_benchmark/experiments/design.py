@@ -16,9 +16,12 @@ from modular_framework_benchmark.experiments.reading import MAX_SEED
 from modular_framework_benchmark.experiments.scene_objects import sampled_scene
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json
+from modular_framework_benchmark.records.perturbation import PERTURBATION
 
 DRAWN_SETTINGS = ("objects", "problem")
-"""Settings that each trial of a combination draws; the other settings determine the running stack."""
+"""Settings that each trial of a combination draws."""
+EPISODE_SETTINGS = (*DRAWN_SETTINGS, PERTURBATION)
+"""Settings that each episode applies to its world; the other settings determine the running stack."""
 
 
 def plan_episodes(experiment: Experiment) -> list[EpisodeSpec]:
@@ -53,11 +56,12 @@ def _groups(experiment: Experiment) -> list[list[Combination]]:
 
 def stack_of(settings: EpisodeSettings) -> str:
     """Returns the settings that determine an episode's stack as text; episodes with equal texts can share a stack."""
-    return _canonical({name: value for name, value in as_json(settings).items() if name not in DRAWN_SETTINGS})
+    return _canonical({name: value for name, value in as_json(settings).items() if name not in EPISODE_SETTINGS})
 
 
 def _episode(experiment: Experiment, combination: Combination, trial: int, number: int) -> EpisodeSpec:
-    pair_key = pair_of(combination.configuration, experiment.description.compared)
+    # All perturbations of a trial share its scene, so that they differ only in what is perturbed.
+    pair_key = pair_of(combination.configuration, experiment.description.compared, PERTURBATION)
     return EpisodeSpec(
         number=number,
         configuration=dict(combination.configuration),
@@ -67,9 +71,9 @@ def _episode(experiment: Experiment, combination: Combination, trial: int, numbe
     )
 
 
-def pair_of(configuration: Mapping[str, str], compared: str) -> str:
-    """Returns the levels of the factors that are not compared, which the episodes of a pair share."""
-    return ",".join(f"{name}={configuration[name]}" for name in sorted(configuration) if name != compared)
+def pair_of(configuration: Mapping[str, str], *excluded: str) -> str:
+    """Returns the levels of the factors that are not excluded, which the episodes with the same scene share."""
+    return ",".join(f"{name}={configuration[name]}" for name in sorted(configuration) if name not in excluded)
 
 
 def _drawn(experiment: Experiment, combination: Combination, pair_key: str, trial: int) -> EpisodeSettings:

@@ -15,6 +15,7 @@ from modular_framework_benchmark.experiments.experiment import Combination, Expe
 from modular_framework_benchmark.experiments.factor_reading import (
     Levels,
     combined,
+    note_conflicts,
     note_equal_levels,
     note_unused,
     read_design,
@@ -23,11 +24,13 @@ from modular_framework_benchmark.experiments.factor_reading import (
 from modular_framework_benchmark.experiments.metric_choices import metric_files, read_metrics
 from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingsCheck
 from modular_framework_benchmark.experiments.modes import MODES
+from modular_framework_benchmark.experiments.perturb_reading import perturbation_factor, with_perturbations
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, MetricSpec, RecordedFiles, as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
+from modular_framework_benchmark.records.perturbation import PERTURBATION
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
@@ -36,8 +39,8 @@ from modular_framework_ros.allowed_names import closest
 
 REQUIRED = ("experiment", "mode", "factors", "compare")
 OPTIONAL = (
-    "description", "design", "trials", "seed", "block", "metrics", "stopping", "confidence", "time_limit", "workers",
-    "record",
+    "description", "design", "perturb", "trials", "seed", "block", "metrics", "stopping", "confidence", "time_limit",
+    "workers", "record",
 )  # fmt: skip
 KEYS = (*REQUIRED, *OPTIONAL)
 CONDITIONAL_METRICS: Map[str, tuple[Callable[[EpisodeSettings], bool], str]] = {
@@ -158,9 +161,11 @@ class _Reader:
             reading.choice(entries["mode"], "mode", tuple(MODES))
         name = reading.name(entries["experiment"], "experiment") if "experiment" in entries else ""
         factors = self._factors()
-        compared = self._compared(factors)
-        design = read_design(entries.get("design"), factors, reading) if factors else []
+        own = {factor: levels for factor, levels in factors.items() if factor != PERTURBATION}
+        compared = self._compared(own)
+        design = read_design(entries.get("design"), own, reading) if own else []
         self._note_unpaired(design, compared)
+        design = with_perturbations(design, factors)
         numbers = self._numbers(len(design))
         combinations = self._combinations(factors, design)
         metrics, metric_specs = self._metrics(combinations)
@@ -204,6 +209,8 @@ class _Reader:
         if node is None:
             return {}
         factors = read_factors(node, self._mode_keys, self._reading)
+        factors = {**factors, **perturbation_factor(self._root, self._mode, self._reading)}
+        note_conflicts(factors, self._reading)
         trees = [self._base, *(level.settings for levels in factors.values() for level in levels.values())]
         unknown = [name for tree in trees for name in check_references(tree, factors, self._reading.faults)]
         self._meant_factors = {name: meant for name in unknown if (meant := closest(name, factors)) is not None}

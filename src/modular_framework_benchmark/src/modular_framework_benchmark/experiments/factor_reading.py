@@ -52,7 +52,6 @@ def read_factors(node: Node, mode_keys: Collection[str], reading: Reading) -> Le
         if not name.isidentifier():
             reading.faults.add(mapping.keys[name], f"the factor '{name}' must be letters, digits and underscores")
         factors[name] = _read_levels(name, value, mode_keys, reading)
-    _note_conflicts(factors, reading)
     return factors
 
 
@@ -84,8 +83,13 @@ def _items_of(node: Node) -> Iterable[object]:
     return node.entries if isinstance(node, Mapping) else node.items if isinstance(node, Sequence) else ()
 
 
-def _note_conflicts(factors: Levels, reading: Reading) -> None:
-    """Adds a fault for each value that two factors set, because the effective value would be undefined."""
+def note_conflicts(factors: Levels, reading: Reading) -> None:
+    """Adds a fault for each value that two factors set, because the effective value would be undefined.
+
+    Args:
+        factors: Levels of each factor.
+        reading: Reader that collects faults.
+    """
     setters: dict[tuple[str, ...], str] = {}
     for name, levels in factors.items():
         for level in levels.values():

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Map
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.distributions import (
@@ -20,11 +20,14 @@ from modular_framework_benchmark.experiments.model_sizes import longest_side, lo
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.records.episode_settings import PlacedObject
-from modular_framework_core.files.faults import Fault
+from modular_framework_benchmark.records.perturbation import ObjectPerturbation, Perturbation
+from modular_framework_core.files.faults import Fault, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
 from modular_framework_core.files.located_yaml import Sequence as ListNode
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, renamed_key
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.changed_model import changed_model
+from modular_framework_simulation.models.scaled_models import read_scaled
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 SURFACE, OLD_SURFACE = "rests_at", "on"
@@ -52,6 +55,7 @@ class SceneObject:
         size: Distribution of the length of the longest side [m]; None for the size of the model file.
         spacing_m: Smallest horizontal distance between the object's frame and the frames of the objects before it [m].
         node: Mapping of the file, for faults.
+        perturbation: Values of the perturbed axes.
     """
 
     name: str
@@ -62,9 +66,16 @@ class SceneObject:
     size: Distribution | None = None
     spacing_m: float = 0.0
     node: Mapping | None = field(default=None, compare=False, repr=False)
+    perturbation: Perturbation = Perturbation()
+
+    @property
+    def diagonal_m(self) -> float:
+        """Returns the largest possible diagonal of the object's horizontal sides [m]."""
+        scale = 1.0 if self.size is None else self.size.high / longest_side(self.file)
+        return scale * self.perturbation.object_size * math.hypot(*sides(self.file)[:2])
 
     def sampled(self, key: tuple[object, ...], index: int, draw: int = 0) -> PlacedObject:
-        """Returns the object with the pose and the size drawn for a trial.
+        """Returns the object with the pose, the size and the perturbation drawn for a trial.
 
         Args:
             key: Key of the random generator: the experiment's seed, the trial, ...
@@ -73,13 +84,27 @@ class SceneObject:
         """
         key = (*key, "objects", index, *((draw,) if draw else ()))
         numbers = {name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, name)) for name in POSE_KEYS}
-        scale = None
-        if self.size is not None:
-            scale = round(self.size.draw(generator_of(*key, SIZE)) / longest_side(self.file), 6)
+        scale = self._scale(key)
         if self.surface is not None:
             surface = self.surface.draw(generator_of(*key, OLD_SURFACE))
             numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"], scale or 1.0)
-        return PlacedObject(self.name, self.model, scale=scale, **numbers)
+        return PlacedObject(self.name, self.model, scale=scale, perturbed=self._perturbed(key), **numbers)
+
+    def _scale(self, key: tuple[object, ...]) -> float | None:
+        """Returns the factor of the model's lengths; None for the model as it is."""
+        perturbed = self.perturbation.object_size
+        if self.size is None:
+            return None if perturbed == 1.0 else perturbed
+        return round(perturbed * self.size.draw(generator_of(*key, SIZE)) / longest_side(self.file), 6)
+
+    def _perturbed(self, key: tuple[object, ...]) -> ObjectPerturbation | None:
+        """Returns the perturbation that the world applies besides the scale; None for none."""
+        values, error = self.perturbation, (0.0, 0.0)
+        if distance_m := values.perceived_pose_error:
+            direction_rad = generator_of(*key, "pose_error").uniform(-math.pi, math.pi)
+            error = (round(distance_m * math.cos(direction_rad), 9), round(distance_m * math.sin(direction_rad), 9))
+        found = ObjectPerturbation(mass=values.object_mass, friction=values.object_friction, pose_error=error)
+        return None if found == ObjectPerturbation() else found
 
     def is_clear_of(self, placed: PlacedObject, others: Sequence[PlacedObject]) -> bool:
         """Returns whether the object keeps its spacing.
@@ -224,9 +249,8 @@ def _named_objects(found: ObjectNodes, file: Path, taken: set[str], reading: Rea
         location = found.node.entries.get("name", found.node).location
         reading.faults.add(location, f"two objects have the name '{min(same)}'; rename one of them")
     taken.update(names)
-    _check_model(found, file, reading)
     is_path = "/" in found.model or found.model.endswith(".sdf")
-    return [
+    objects = [
         SceneObject(
             name,
             str(file) if is_path else found.model,
@@ -239,33 +263,36 @@ def _named_objects(found: ObjectNodes, file: Path, taken: set[str], reading: Rea
         )
         for name in names
     ]
+    _check_model(found.node, objects, reading)
+    return objects
 
 
-def _check_model(found: ObjectNodes, file: Path, reading: Reading) -> None:
+def _check_model(node: Mapping, objects: Sequence[SceneObject], reading: Reading) -> None:
     """Adds a fault if the model cannot rest on a surface, have a size, or stand beside others of its kind."""
+    file = objects[0].file
     checks: dict[str, Callable[[], object]] = {
         SURFACE: lambda: lowest_point(file, 0.0, 0.0),
         SIZE: lambda: longest_side(file),
-        COUNT: lambda: _check_spacing(found, file, reading),
+        COUNT: lambda: _check_spacing(objects, node.entries.get(SPACING, node).location, reading),
     }
     for key, check in checks.items():
-        if key in found.node.entries:
+        if key in node.entries:
             try:
                 check()
             except DescriptionError as error:
                 what = {SURFACE: "has no lowest point", SIZE: "cannot have a size"}.get(key, "has no extent")
-                reading.faults.add(found.node.entries[key].location, f"the model {what}: {error}")
+                reading.faults.add(node.entries[key].location, f"the model {what}: {error}")
 
 
-def _check_spacing(found: ObjectNodes, file: Path, reading: Reading) -> None:
+def _check_spacing(objects: Sequence[SceneObject], location: SourceLocation, reading: Reading) -> None:
     """Adds a fault if several objects of a model could overlap."""
-    scale = found.size.high / longest_side(file) if found.size is not None else 1.0
-    diagonal = scale * math.hypot(*sides(file)[:2])
-    if found.count is not None and found.count > 1 and found.spacing_m < diagonal:
+    first, size = objects[0], objects[0].perturbation.object_size
+    if len(objects) > 1 and first.spacing_m < first.diagonal_m:
+        model = "the model" if size == 1.0 else f"the model with object_size {size:g}"
         reading.faults.add(
-            found.node.entries.get(SPACING, found.node).location,
-            f"{found.count} objects with a {SPACING} of {found.spacing_m:g} m could overlap; allowed: at least the "
-            f"diagonal of the model, {diagonal:.3f} m",
+            location,
+            f"{len(objects)} objects with a {SPACING} of {first.spacing_m:g} m could overlap; allowed: at least the "
+            f"diagonal of {model}, {first.diagonal_m:.3f} m",
         )
 
 
@@ -297,3 +324,49 @@ def placed_objects(
             for fault in error.faults:
                 reading.faults.add(fault.location, fault.message)
     return objects
+
+
+def perturbed_objects(
+    objects: Sequence[SceneObject], perturbation: Perturbation, location: SourceLocation, reading: Reading
+) -> list[SceneObject]:
+    """Returns objects with their perturbation, and adds a fault for each object that cannot be perturbed.
+
+    Args:
+        objects: Objects of the experiment.
+        perturbation: Values of the perturbed axes.
+        location: Location of the perturbation in the file.
+        reading: Reader that collects faults.
+    """
+    perturbed = [replace(item, perturbation=perturbation) for item in objects]
+    for _, group in itertools.groupby(perturbed, key=lambda item: id(item.node)):
+        same_model = tuple(group)
+        try:
+            _check_perturbation(same_model, location, reading)
+        except (DescriptionError, OSError, ValueError) as error:
+            reading.faults.add(location, f"object '{same_model[0].name}' cannot be perturbed: {error}")
+    return perturbed
+
+
+def _check_perturbation(objects: Sequence[SceneObject], location: SourceLocation, reading: Reading) -> None:
+    """Checks that objects of one model can be perturbed, and adds a fault if another size has no place.
+
+    Args:
+        objects: Perturbed objects of the model.
+        location: Location of the perturbation in the file.
+        reading: Reader that collects faults.
+
+    Raises:
+        DescriptionError: The model cannot be changed.
+        OSError: The file of the model cannot be read.
+        ValueError: The file of the model has text in place of a number.
+    """
+    first, values = objects[0], objects[0].perturbation
+    is_scaled = values.object_size != 1.0
+    text = read_scaled(first.file, values.object_size if is_scaled else None)
+    changed_model(text, str(first.file), mass=values.object_mass, friction=values.object_friction)
+    if not is_scaled:
+        return
+    if "z" in first.pose:
+        fault = f"object '{first.name}' has z, and in another size it would not rest on its surface"
+        reading.faults.add(location, f"{fault}; write {SURFACE} instead of z")
+    _check_spacing(objects, location, reading)

@@ -11,15 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting
+from modular_framework_benchmark.experiments.perturb_reading import read_perturbation
 from modular_framework_benchmark.experiments.predicate_reading import KnownNames, PredicateReading, read_regions
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
-from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, placed_objects, read_objects
+from modular_framework_benchmark.experiments.scene_objects import (
+    ObjectNodes,
+    perturbed_objects,
+    placed_objects,
+    read_objects,
+)
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA, SuccessCriteria
 from modular_framework_benchmark.predicates.conditions import HeldFor, Lifted, Region
 from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, PlacedObject, SettingsError
+from modular_framework_benchmark.records.perturbation import PERTURBATION, Perturbation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.key_spelling import intended_key
 from modular_framework_core.task_constructor.machine_files import machine_files
@@ -117,6 +124,7 @@ class TaskSettings(EpisodeSettings):
         regions: Regions that predicates name.
         success: Success criteria.
         progress: Milestones in their order.
+        perturbation: Values of the perturbed axes; None for none.
     """
 
     launch: str = setting(_read_launch, DEFAULT_LAUNCH)
@@ -129,6 +137,7 @@ class TaskSettings(EpisodeSettings):
     regions: tuple[Region, ...] = setting(read_regions, ())
     success: SuccessCriteria = setting(_read_later, NO_CRITERIA)
     progress: tuple[Milestone, ...] = setting(_read_later, ())
+    perturbation: Perturbation | None = setting(read_perturbation, None)
 
     @property
     def judged_object(self) -> str:
@@ -199,6 +208,11 @@ def _finish(
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
     objects = placed_objects(nodes, settings.launch, sound, reading)
+    if settings.perturbation is not None:
+        location = _location_of(read.node, PERTURBATION)
+        if not nodes and "objects" not in read.unreadable:
+            reading.faults.add(location, "there are no objects to perturb; list them in the key objects")
+        objects = perturbed_objects(objects, settings.perturbation, location, reading)
     if "objects" in read.unreadable or len(objects) < sum(node.count or 1 for node in nodes):
         names = KnownNames()
     else:

@@ -13,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar, get_args, get_type_hints
 
+from modular_framework_benchmark.records.perturbation import ObjectPerturbation
+
 
 class SettingsError(ValueError):
     """A setting of an episode has a wrong type or value; the message names the setting."""
@@ -28,6 +30,7 @@ class PlacedObject:
         x: Position in the world frame, with y and z [m].
         roll: Angle in the world frame, with pitch and yaw [rad].
         scale: Factor of the model's lengths; None for the size of the model file.
+        perturbed: Perturbation of the object; None for none.
     """
 
     name: str
@@ -39,6 +42,7 @@ class PlacedObject:
     pitch: float = 0.0
     yaw: float = 0.0
     scale: float | None = None
+    perturbed: ObjectPerturbation | None = None
 
     @property
     def xyz(self) -> tuple[float, float, float]:
