@@ -18,6 +18,8 @@ from plotly.offline import get_plotlyjs
 from modular_framework_benchmark.reports import number_text
 from modular_framework_benchmark.reports.figure_style import NamedFigure, words
 from modular_framework_benchmark.reports.report_content import ReportContent, machine_readable
+from modular_framework_benchmark.reports.robustness_figures import FIGURE_PREFIX
+from modular_framework_benchmark.reports.robustness_tables import robustness_tables
 from modular_framework_benchmark.reports.tables import (
     Cell,
     answer_sentences,
@@ -32,7 +34,8 @@ from modular_framework_benchmark.reports.tables import (
 )
 
 SECTIONS = (
-    ("comparison", "Comparison"), ("components", "By component"), ("missing", "Missing values"),
+    ("comparison", "Comparison"), ("robustness", "Robustness"), ("components", "By component"),
+    ("missing", "Missing values"),
     ("levels", "Other factors"), ("timelines", "Time"), ("failures", "Failures"),
     ("progress", "Progress"), ("run", "What was run"), ("words", "How to read this page"),
 )  # fmt: skip
@@ -46,7 +49,8 @@ def report_page(content: ReportContent, database: str) -> str:
         database: Database as named by the user.
     """
     figures = {figure.name: figure for figure in content.figures}
-    absent = {name for name, there in (("levels", content.levels), ("timelines", content.spans)) if not there}
+    parts = (("robustness", content.robustness), ("levels", content.levels), ("timelines", content.spans))
+    absent = {name for name, part in parts if not part}
     return render_page(
         "report.html.jinja",
         machine_readable(content),
@@ -57,6 +61,8 @@ def report_page(content: ReportContent, database: str) -> str:
         answer=answer_sentences(content),
         sections=[section for section in SECTIONS if section[0] not in absent],
         components=[_component(content, name) for name in content.components],
+        robustness_figures=[figure for figure in content.figures if figure.name.startswith(FIGURE_PREFIX)],
+        robustness_tables=robustness_tables(content),
         tables={
             "answer": answer_table(content),
             "overview": overview_table(content),

@@ -13,11 +13,14 @@ from typing import Any
 
 import pandas as pd
 
+from modular_framework_benchmark.experiments.perturb_reading import perturbations_of, with_run_labels
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Metric
+from modular_framework_benchmark.records.perturbation import PERTURBATION
 from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.distribution_figures import distribution_figures
 from modular_framework_benchmark.reports.failure_groups import Failures, failures_figure, group_failures
 from modular_framework_benchmark.reports.figure_style import NamedFigure
+from modular_framework_benchmark.reports.robustness_figures import robustness_figures
 from modular_framework_benchmark.reports.run_record import (
     CombinationSnapshots,
     RecordedValue,
@@ -38,6 +41,7 @@ from modular_framework_benchmark.reports.time_figures import components_figure, 
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
 from modular_framework_benchmark.statistics.observations import metrics_of
+from modular_framework_benchmark.statistics.robustness import Robustness, analyse_robustness
 
 SUCCESS = "success"
 MAX_PAIRED_METHODS = 3  # maximum number of methods with one figure per pair; more methods are ranked in one figure
@@ -106,6 +110,7 @@ class ReportContent:
         analysis: Statistical analysis.
         metrics: Metrics in the order of the components.
         levels: Success of each method at each level of the other factors.
+        robustness: Success of each method along each perturbed axis; None without perturbations.
         spans: Time of states and components.
         chosen: Episodes whose timelines are shown.
         failures: Unsuccessful episodes by cause.
@@ -122,6 +127,7 @@ class ReportContent:
     analysis: Analysis
     metrics: tuple[Metric, ...]
     levels: tuple[MethodSummary, ...]
+    robustness: Robustness | None
     spans: tuple[SpanSummary, ...]
     chosen: tuple[ChosenEpisode, ...]
     failures: Failures
@@ -151,7 +157,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     """
     description = results.description
     analysis = analyse(results, mean_intervals=mean_intervals)
-    levels = _success_by_level(results)
+    levels, robustness = _success_by_level(results), _robustness(results)
     chosen = choose_episodes(results, source.database_folder, source.report_folder)
     timelines = source.spans_of([item.number for item in chosen])
     spans = summarise_spans(results, source.span_totals, timelines)
@@ -162,6 +168,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     episodes = {item.method: item.counts.episodes for item in analysis.summaries if item.metric == SUCCESS}
     figures = _comparison_figures(results, analysis) + _present(
         milestones_figure(spans, {name: count for name, count in episodes.items() if count}),
+        *(robustness_figures(robustness) if robustness is not None else ()),
         components_figure(spans, methods),
         levels_figure(levels, methods),
         timelines_figure(chosen, timelines),
@@ -170,8 +177,8 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     )
     return ReportContent(
         description=description, planned=results.planned, finished=len(results.episodes),
-        facts=_run_facts(results, source.snapshots), analysis=analysis, metrics=metrics, levels=levels, spans=spans,
-        chosen=chosen, failures=failures, figures=tuple(figures), recorded=recorded,
+        facts=_run_facts(results, source.snapshots), analysis=analysis, metrics=metrics, levels=levels,
+        robustness=robustness, spans=spans, chosen=chosen, failures=failures, figures=tuple(figures), recorded=recorded,
         warnings=warnings_of(results, source.snapshots, source.combinations),
         commands=commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
@@ -183,8 +190,18 @@ def _component_order(metric: Metric) -> int:
 
 def _success_by_level(results: ExperimentResults) -> tuple[MethodSummary, ...]:
     description = results.description
-    others = [factor.name for factor in description.factors if factor.name != description.compared]
+    excluded = (description.compared, PERTURBATION)  # robustness curves show the perturbations
+    others = [factor.name for factor in description.factors if factor.name not in excluded]
     return tuple(item for name in others for item in summarise_by_level(results, name) if item.metric == SUCCESS)
+
+
+def _robustness(results: ExperimentResults) -> Robustness | None:
+    description = results.description
+    labels = next((factor.levels for factor in description.factors if factor.name == PERTURBATION), ())
+    perturbations = perturbations_of(description.text) if labels else None
+    if perturbations is None:
+        return None
+    return analyse_robustness(results, with_run_labels(perturbations, labels))
 
 
 def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
@@ -246,6 +263,7 @@ def machine_readable(content: ReportContent) -> dict[str, Any]:
             "finished": content.finished,
             "analysis": asdict(content.analysis),
             "levels": [asdict(item) for item in content.levels],
+            "robustness": None if content.robustness is None else asdict(content.robustness),
             "spans": [asdict(item) for item in content.spans],
             "failures": asdict(content.failures),
             "warnings": content.warnings,

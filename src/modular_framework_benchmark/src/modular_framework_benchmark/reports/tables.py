@@ -18,6 +18,7 @@ from modular_framework_benchmark.reports.number_text import (
     percentage_text,
 )
 from modular_framework_benchmark.reports.report_content import MAX_PAIRED_METHODS, SUCCESS, ReportContent
+from modular_framework_benchmark.reports.robustness_figures import robustness_sentences
 from modular_framework_benchmark.reports.success_figures import level_words
 from modular_framework_benchmark.statistics.comparison import (
     Comparison,
@@ -165,10 +166,14 @@ def answer_table(content: ReportContent) -> Table:
 
 
 def answer_sentences(content: ReportContent) -> tuple[str, ...]:
-    """Returns the shown differences and one line for all others; with many methods, one line per metric."""
+    """Returns the shown differences, one line for all others, and the lines on robustness.
+
+    With many methods, the differences have one line per metric.
+    """
     comparisons = content.analysis.comparisons
+    robustness = () if content.robustness is None else robustness_sentences(content.robustness)
     if not comparisons:
-        return content.analysis.sentences
+        return (*content.analysis.sentences, *robustness)
     won = [item for item in comparisons if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)]
     lines = [item.sentence for item in won]
     if len(content.analysis.methods) > MAX_PAIRED_METHODS:
@@ -180,7 +185,7 @@ def answer_sentences(content: ReportContent) -> tuple[str, ...]:
         (counts[Verdict.NO_DATA], "nothing to compare"),
     ]
     parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in unshown if number]
-    return (*lines, *(["; ".join(parts)] if parts else []))
+    return (*lines, *(["; ".join(parts)] if parts else []), *robustness)
 
 
 def _grouped(items: Sequence[Comparison]) -> list[str]:

@@ -138,19 +138,19 @@ def other_factors(results: ExperimentResults) -> tuple[Factor, ...]:
     return tuple(factor for factor in results.description.factors if factor.name != results.description.compared)
 
 
-def restricted(results: ExperimentResults, factor: str, level: str) -> ExperimentResults:
-    """Returns the results of the episodes at one level of a factor.
+def restricted(results: ExperimentResults, factor: str, *levels: str) -> ExperimentResults:
+    """Returns the results of the episodes at some levels of a factor.
 
     Args:
         results: Results of the experiment.
         factor: Name of the factor.
-        level: Label of the level.
+        *levels: Labels of the levels.
 
     Raises:
         ValueError: The experiment lacks the factor.
     """
     _factor(results, factor)
-    chosen = results.episodes[results.episodes[factor] == level]
+    chosen = results.episodes[results.episodes[factor].isin(levels)]
     finished = len(results.episodes) >= results.planned
     return dataclasses.replace(results, episodes=chosen, planned=len(chosen) if finished else results.planned)
 

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows the robustness of the methods: a figure per perturbed axis, and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from modular_framework_benchmark.records.perturbation import AXES, FACTOR, PerturbedAxis
+from modular_framework_benchmark.reports.figure_style import (
+    MUTED,
+    NamedFigure,
+    axis_title,
+    color_of,
+    dash_of,
+    label,
+    styled,
+    words,
+)
+from modular_framework_benchmark.reports.number_text import interval_text, percentage_text
+from modular_framework_benchmark.statistics.comparison import Estimate
+from modular_framework_benchmark.statistics.robustness import (
+    CrossingKind,
+    CurvePoint,
+    FittedSide,
+    Robustness,
+    RobustnessCurve,
+)
+from modular_framework_benchmark.statistics.sentences import enumeration
+
+FIGURE_PREFIX = "robustness_"
+DODGE = 0.008
+"""Distance between the points of two methods at one level, as a fraction of the tested range."""
+
+
+def robustness_figures(robustness: Robustness) -> list[NamedFigure]:
+    """Returns a figure per axis: success, and progress if there are milestones, against the level of the axis."""
+    return [_figure(robustness, axis) for axis in robustness.perturbations.axes if robustness.of_axis(axis.name)]
+
+
+def _figure(robustness: Robustness, axis: PerturbedAxis) -> NamedFigure:
+    curves = robustness.of_axis(axis.name)
+    wanted = robustness.perturbations.wanted_success
+    has_progress = any(point.progress is not None for curve in curves for point in curve.points)
+    figure = make_subplots(cols=2 if has_progress else 1, horizontal_spacing=0.1)
+    values = [point.value for curve in curves for point in curve.points]
+    step = DODGE * (max(values) - min(values)) if values else 0.0
+    for index, curve in enumerate(curves):
+        shift = step * (index - (len(curves) - 1) / 2)
+        figure.add_trace(_points(curve, index, shift, lambda point: point.success.estimate), row=1, col=1)
+        for side in curve.sides:
+            figure.add_trace(_line(side, curve.method, index), row=1, col=1)
+        if has_progress:
+            trace = _points(curve, index, shift, lambda point: point.progress.mean if point.progress else None)
+            trace.update(showlegend=False, mode="lines+markers", line=_stroke(index))
+            figure.add_trace(trace, row=1, col=2)
+    figure.add_hline(y=100.0 * wanted, line={"color": MUTED, "width": 1, "dash": "dash"}, row=1, col=1)
+    styled(figure, height=420)
+    figure.update_xaxes(title_text=_title(axis))
+    figure.update_yaxes(range=[-3, 103])
+    figure.update_yaxes(title_text="success [%]", row=1, col=1)
+    if has_progress:
+        figure.update_yaxes(title_text="mean progress [%]", row=1, col=2)
+    summary = (
+        f"Success of each method against {words(axis.name)}, with {percentage_text(robustness.confidence, 0)} "
+        f"intervals of single levels. Line: {robustness.fit}. Dashed: wanted success of {percentage_text(wanted, 0)}. "
+        f"{words(axis.name).capitalize()}: {AXES[axis.name].description}"
+    )
+    return NamedFigure(f"{FIGURE_PREFIX}{axis.name}", f"Robustness to {words(axis.name)}", summary, figure)
+
+
+def _title(axis: PerturbedAxis) -> str:
+    return axis_title(axis.name, axis.unit)
+
+
+def _stroke(index: int) -> dict[str, str]:
+    return {"color": color_of(index), "dash": dash_of(index)}
+
+
+def _points(
+    curve: RobustnessCurve, index: int, shift: float, estimate_of: Callable[[CurvePoint], Estimate | None]
+) -> go.Scatter:
+    """Returns the estimates of a curve with their intervals."""
+    known = [(point, found) for point in curve.points if (found := estimate_of(point)) is not None]
+    ends = [(found.interval.low, found.interval.high) if found.interval else (found.value,) * 2 for _, found in known]
+    return go.Scatter(
+        x=[point.value + shift for point, _ in known], y=[100.0 * found.value for _, found in known], mode="markers",
+        name=label(curve.method), legendgroup=curve.method, marker={"color": color_of(index), "size": 8},
+        customdata=[(point.value, point.success.counts.succeeded, point.success.counts.episodes) for point, _ in known],
+        error_y={
+            "type": "data", "symmetric": False, "color": color_of(index), "thickness": 1.4, "width": 5,
+            "array": [100.0 * (high - found.value) for (_, high), (_, found) in zip(ends, known, strict=True)],
+            "arrayminus": [100.0 * (found.value - low) for (low, _), (_, found) in zip(ends, known, strict=True)],
+        },
+        hovertemplate=f"{label(curve.method)}, level %{{customdata[0]:.4g}}: %{{y:.1f}} % "
+        "(%{customdata[1]} of %{customdata[2]} episodes succeeded)<extra></extra>",
+    )  # fmt: skip
+
+
+def _line(side: FittedSide, method: str, index: int) -> go.Scatter:
+    return go.Scatter(
+        x=side.values, y=[100.0 * rate for rate in side.rates], mode="lines", line=_stroke(index),
+        legendgroup=method, showlegend=False, hoverinfo="skip",
+    )  # fmt: skip
+
+
+def value_text(value: float, axis: PerturbedAxis) -> str:
+    """Returns a value of an axis with its unit."""
+    return f"{value:.3g}" if axis.unit == FACTOR else f"{value:.3g} {axis.unit}"
+
+
+def side_text(side: FittedSide, axis: PerturbedAxis, wanted: float) -> str:
+    """Returns the level at which a method falls below the wanted success; nothing outside the tested levels.
+
+    Args:
+        side: Fitted curve on one side of the nominal value.
+        axis: Perturbed axis.
+        wanted: Wanted success rate, from 0 to 1.
+    """
+
+    def text(value: float | None) -> str:
+        return "" if value is None else value_text(value, axis)
+
+    rate = percentage_text(wanted, 0)
+    match side.kind:
+        case CrossingKind.WITHIN:
+            found = f"below {rate} at about {text(side.crossing)}, between {text(side.last_reached)} and "
+            found += text(side.first_below)
+        case CrossingKind.AT_NOMINAL:
+            found = f"below {rate} at {text(side.first_below)} already"
+        case CrossingKind.NOT_REACHED:
+            found = f"not below {rate} at the tested levels, the last of which is {text(side.values[-1])}"
+    shown = [
+        *([f"shown to reach {rate} up to {text(side.shown_reached)}"] if side.shown_reached is not None else []),
+        *([f"shown to be below from {text(side.shown_below)}"] if side.shown_below is not None else []),
+    ]
+    return found + (f" ({'; '.join(shown)})" if shown else "")
+
+
+def robustness_sentences(robustness: Robustness) -> tuple[str, ...]:
+    """Returns the falls along the axes, and for each curve the level at which it falls below the wanted success."""
+    wanted = robustness.perturbations.wanted_success
+    lines = [_falls_sentence(robustness)]
+    for name in robustness.order:
+        for curve in robustness.of_axis(name):
+            found = [side_text(side, curve.axis, wanted) for side in curve.sides]
+            if found:
+                lines.append(f"{words(name)}, {curve.method}: {' and '.join(found)}")
+    return tuple(line for line in lines if line)
+
+
+def _falls_sentence(robustness: Robustness) -> str:
+    """Returns the axes that are shown to lower success, and the axis with the largest mean fall."""
+    name = next(iter(robustness.order), "")
+    curves = [curve for curve in robustness.of_axis(name) if curve.fall is not None]
+    if not curves:
+        return ""
+    falls = enumeration([f"{_fall_text(curve)} for {curve.method}" for curve in curves])
+    largest = f"the largest mean fall in success is along {words(name)}: {falls}"
+    if not robustness.perturbations.one_at_a_time:
+        return largest
+    shown = [words(axis) for axis in robustness.order if any(_is_shown(curve) for curve in robustness.of_axis(axis))]
+    verb = "are" if len(shown) > 1 else "is"
+    return f"{enumeration(shown) if shown else 'no axis'} {verb} shown to lower success; {largest}"
+
+
+def _is_shown(curve: RobustnessCurve) -> bool:
+    interval = None if curve.fall is None else curve.fall.points.interval
+    return interval is not None and interval.low > 0.0
+
+
+def _fall_text(curve: RobustnessCurve) -> str:
+    assert curve.fall is not None
+    at = value_text(curve.fall.value, curve.axis)
+    return f"{fall_text(curve)} points at {at}"
+
+
+def fall_text(curve: RobustnessCurve) -> str:
+    """Returns the largest fall of a curve in points with its interval; "" without a fall."""
+    if curve.fall is None:
+        return ""
+    found = curve.fall.points
+    low, high = (None, None) if found.interval is None else (found.interval.low, found.interval.high)
+    return interval_text(100.0 * found.value, _percent(low), _percent(high), "%")
+
+
+def _percent(fraction: float | None) -> float | None:
+    return None if fraction is None else 100.0 * fraction

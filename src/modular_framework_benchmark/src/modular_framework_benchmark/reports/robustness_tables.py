@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of the robustness of the methods."""
+
+from __future__ import annotations
+
+from modular_framework_benchmark.records.perturbation import PerturbedAxis
+from modular_framework_benchmark.reports.figure_style import words
+from modular_framework_benchmark.reports.number_text import NONE, count_text, percentage_text
+from modular_framework_benchmark.reports.report_content import ReportContent
+from modular_framework_benchmark.reports.robustness_figures import fall_text, side_text, value_text
+from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text
+from modular_framework_benchmark.statistics.observations import SUCCESS
+from modular_framework_benchmark.statistics.robustness import CurvePoint, Robustness
+
+
+def robustness_tables(content: ReportContent) -> tuple[Table, ...]:
+    """Returns the falls in success along each axis, and success and progress at each level."""
+    found = content.robustness
+    return () if found is None else (_falls_table(found), _levels_table(found))
+
+
+def _falls_table(robustness: Robustness) -> Table:
+    wanted = robustness.perturbations.wanted_success
+    rows = []
+    for name in robustness.order:
+        for curve in robustness.of_axis(name):
+            sides = "; ".join(side_text(side, curve.axis, wanted) for side in curve.sides)
+            at = value_text(curve.fall.value, curve.axis) if curve.fall else NONE
+            texts = (fall_text(curve) or NONE, at)
+            rows.append(
+                (Cell(words(name)), Cell(curve.method), *(Cell(text, is_number=True) for text in texts), Cell(sides))
+            )
+    columns = ("axis", "method", "largest fall [points] (interval)", "at", f"success of {percentage_text(wanted, 0)}")
+    caption = "Axes of perturbation, the axis with the largest mean fall in success first."
+    return Table("robustness", caption, columns, tuple(rows), _notes(robustness))
+
+
+def _notes(robustness: Robustness) -> tuple[str, ...]:
+    fit = f"Curve: {robustness.fit}. Levels outside the tested levels are not predicted."
+    if not robustness.perturbations.one_at_a_time:
+        return (fit, "Fall: success of the best group of levels minus success of the worst group, a description only.")
+    fall = (
+        "Fall: nominal success minus the lowest success of the tested levels, in the same scenes. Its interval is "
+        "corrected for the number of levels and methods; the intervals of single levels are not."
+    )
+    return (fit, fall)
+
+
+def _levels_table(robustness: Robustness) -> Table:
+    rows = [
+        (
+            Cell(words(curve.axis.name)),
+            Cell(curve.method),
+            Cell(_level_text(point, curve.axis), is_number=True),
+            Cell(estimate_text(point.success.estimate, SUCCESS), is_number=True),
+            Cell(estimate_text(point.progress.mean, SUCCESS) if point.progress else NONE, is_number=True),
+            Cell(count_text(point.success.counts.succeeded), is_number=True),
+            Cell(count_text(point.success.counts.counted), is_number=True),
+        )
+        for name in robustness.order
+        for curve in robustness.of_axis(name)
+        for point in curve.points
+    ]
+    columns = ("axis", "method", "level", "success [%] (interval)", "mean progress [%] (interval)", "successes",
+               "episodes")  # fmt: skip
+    caption = "Success and progress at each level of the perturbed axes; all other axes are nominal."
+    if not robustness.perturbations.one_at_a_time:
+        caption = "Success and progress in groups of levels; the other axes vary within each group."
+    return Table("robustness_levels", caption, columns, tuple(rows))
+
+
+def _level_text(point: CurvePoint, axis: PerturbedAxis) -> str:
+    """Returns the level of a point, or the range of its group."""
+    if point.low == point.high:
+        return value_text(point.value, axis) + (" (nominal)" if point.value == axis.nominal else "")
+    return f"{point.low:.3g} to {value_text(point.high, axis)}"

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robustness curves: success and progress of each method against the level of each perturbed axis.
+
+A curve is an isotonic regression: success does not rise with the distance from the nominal value. No level outside the
+tested levels is predicted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import takewhile
+
+import numpy as np
+import pandas as pd
+from scipy import optimize
+
+from modular_framework_benchmark.records.experiment import MetricKind
+from modular_framework_benchmark.records.perturbation import (
+    NOMINAL,
+    PERTURBATION,
+    Perturbations,
+    PerturbedAxis,
+    PerturbedLevel,
+)
+from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.statistics.comparison import Estimate, MethodSummary
+from modular_framework_benchmark.statistics.observations import (
+    SUCCESS,
+    EpisodeTable,
+    methods_of,
+    metrics_of,
+    other_factors,
+    restricted,
+)
+from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval
+from modular_framework_benchmark.statistics.summaries import summarise_method
+from modular_framework_benchmark.statistics.values import MIN_UNITS
+
+MAX_GROUPS = 5
+"""Number of groups into which the points of a space-filling design are divided along an axis."""
+FIT = "isotonic regression on each side of the nominal value"
+
+
+class CrossingKind(Enum):
+    """Position of the level at which a method falls below the wanted success."""
+
+    WITHIN = "within"  # between two tested levels
+    AT_NOMINAL = "at_nominal"  # below the wanted success without perturbation, or at the level nearest to it
+    NOT_REACHED = "not_reached"  # not below the wanted success at any tested level
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurvePoint:
+    """Figures of a method at a level of an axis, or at a group of levels of a space-filling design.
+
+    Attributes:
+        value: Value of the axis, or the mean of the group, in the unit of the axis.
+        low: Smallest value of the group.
+        high: Largest value of the group.
+        success: Success of the method.
+        progress: Progress of the method; None without milestones.
+    """
+
+    value: float
+    low: float
+    high: float
+    success: MethodSummary
+    progress: MethodSummary | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedSide:
+    """Fitted curve on one side of the nominal value, outwards from it.
+
+    Attributes:
+        values: Values of the axis, in its unit.
+        rates: Fitted success rates, from 0 to 1.
+        kind: Position of the crossing of the wanted success.
+        crossing: Value at which the curve crosses the wanted success, interpolated; None outside the tested levels.
+        last_reached: Last value at which the curve reaches the wanted success; None for none.
+        first_below: First value at which the curve is below the wanted success; None for none.
+        shown_reached: Last value up to which every interval is at or above the wanted success; None for none.
+        shown_below: First value from which every interval is below the wanted success; None for none.
+    """
+
+    values: tuple[float, ...]
+    rates: tuple[float, ...]
+    kind: CrossingKind
+    crossing: float | None
+    last_reached: float | None
+    first_below: float | None
+    shown_reached: float | None
+    shown_below: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fall:
+    """Largest fall in success from the nominal level.
+
+    Attributes:
+        value: Value of the axis with the lowest success, in its unit.
+        points: Nominal success minus success at this value, from -1 to 1, as a paired difference. The interval is
+            corrected for the number of tested levels and methods; a space-filling design has none.
+        pairs: Number of scenes that ran at both levels; 0 for a space-filling design.
+    """
+
+    value: float
+    points: Estimate
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobustnessCurve:
+    """Curve of a method along an axis.
+
+    Attributes:
+        axis: Perturbed axis.
+        method: Name of the method.
+        points: Figures of the tested levels, in ascending order of the values.
+        sides: Fitted curve on each side of the nominal value that was tested.
+        fall: Largest fall in success; None without episodes.
+    """
+
+    axis: PerturbedAxis
+    method: str
+    points: tuple[CurvePoint, ...]
+    sides: tuple[FittedSide, ...]
+    fall: Fall | None
+
+
+@dataclass(frozen=True, slots=True)
+class Robustness:
+    """Robustness of the methods.
+
+    Attributes:
+        perturbations: Perturbations of the experiment.
+        curves: Curve of each method along each axis.
+        order: Names of the axes, the largest mean fall in success first.
+        confidence: Confidence level of each interval.
+    """
+
+    perturbations: Perturbations
+    curves: tuple[RobustnessCurve, ...]
+    order: tuple[str, ...]
+    confidence: float
+
+    @property
+    def fit(self) -> str:
+        """Returns the name of the fit."""
+        averaged = "" if self.perturbations.one_at_a_time else ", averaged over the other axes"
+        return f"{FIT}{averaged}"
+
+    def of_axis(self, name: str) -> tuple[RobustnessCurve, ...]:
+        """Returns the curves along an axis."""
+        return tuple(curve for curve in self.curves if curve.axis.name == name)
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    values: tuple[float, ...]
+    labels: tuple[str, ...]
+
+
+def analyse_robustness(results: ExperimentResults, perturbations: Perturbations) -> Robustness:
+    """Returns the curve of each method along each perturbed axis.
+
+    Args:
+        results: Finished episodes.
+        perturbations: Perturbations of the experiment.
+
+    Raises:
+        ValueError: The experiment lacks the compared factor or the factor of the perturbations.
+    """
+    analysis = _Analysis(results, perturbations)
+    curves = tuple(curve for axis in perturbations.axes for curve in analysis.curves(axis))
+    return Robustness(perturbations, curves, _order(curves), results.description.confidence)
+
+
+class _Analysis:
+    """Computes the curves of an experiment."""
+
+    def __init__(self, results: ExperimentResults, perturbations: Perturbations) -> None:
+        self._results, self._perturbations = results, perturbations
+        self._progress = next((item for item in metrics_of(results) if item.kind is MetricKind.PARTIAL_CREDIT), None)
+
+    def curves(self, axis: PerturbedAxis) -> list[RobustnessCurve]:
+        """Returns the curve of each method along an axis."""
+        groups, wanted = _groups(axis, self._perturbations), self._perturbations.wanted_success
+        tables = [EpisodeTable(restricted(self._results, PERTURBATION, *group.labels)) for group in groups]
+        curves = []
+        for method in methods_of(self._results):
+            points = tuple(self._point(*each, method) for each in zip(groups, tables, strict=True))
+            fall = self._fall(axis, method, points, groups)
+            sides = _sides(axis, points, wanted)
+            curves.append(RobustnessCurve(axis=axis, method=method, points=points, sides=sides, fall=fall))
+        return curves
+
+    def _point(self, group: _Group, table: EpisodeTable, method: str) -> CurvePoint:
+        return CurvePoint(
+            value=float(np.mean(group.values)),
+            low=group.values[0],
+            high=group.values[-1],
+            success=summarise_method(table, SUCCESS, method),
+            progress=None if self._progress is None else summarise_method(table, self._progress, method),
+        )
+
+    def _fall(
+        self, axis: PerturbedAxis, method: str, points: Sequence[CurvePoint], groups: Sequence[_Group]
+    ) -> Fall | None:
+        known = [
+            (found.value, point.value, group)
+            for point, group in zip(points, groups, strict=True)
+            if (found := point.success.estimate) is not None and point.value != axis.nominal
+        ]
+        if not known:
+            return None
+        lowest, value, group = min(known, key=lambda item: item[0])
+        if not self._perturbations.one_at_a_time:
+            highest = max(rate for rate, _, _ in known)
+            return Fall(value=value, points=Estimate("difference of groups", highest - lowest, None), pairs=0)
+        outcomes = self._paired(method, group.labels[0])
+        if outcomes is None:
+            return None
+        description = self._results.description
+        tested = (len(self._perturbations.levels) - 1) * len(methods_of(self._results))
+        is_valid = outcomes.pairs >= MIN_UNITS and not description.holds_at_any_time
+        interval = paired_interval(outcomes, 1 - (1 - description.confidence) / tested) if is_valid else None
+        estimate = Estimate("paired difference", outcomes.difference, interval)
+        return Fall(value=value, points=estimate, pairs=outcomes.pairs)
+
+    def _paired(self, method: str, label: str) -> PairOutcomes | None:
+        """Returns the scenes that succeed only at the nominal level (won) or only at another level (lost)."""
+        results = self._results
+        episodes = results.episodes[results.episodes[results.description.compared] == method]
+        keys = [factor.name for factor in other_factors(results) if factor.name != PERTURBATION] + ["trial"]
+        sides = [episodes[episodes[PERTURBATION] == each].set_index(keys)["success"] for each in (NOMINAL, label)]
+        pairs = pd.concat(sides, axis=1, join="inner", keys=["nominal", "perturbed"]).astype(bool)
+        if pairs.empty:
+            return None
+        won, lost = pairs["nominal"] & ~pairs["perturbed"], ~pairs["nominal"] & pairs["perturbed"]
+        return PairOutcomes(int(won.sum()), int(lost.sum()), len(pairs))
+
+
+def _groups(axis: PerturbedAxis, perturbations: Perturbations) -> list[_Group]:
+    """Returns the levels of an axis in ascending order; those of a space-filling design in groups of equal size."""
+    if perturbations.one_at_a_time:
+        of_axis = [level for level in perturbations.levels if _perturbs_only(level, axis, perturbations)]
+        return [_Group((level.values[axis.name],), (level.label,)) for level in _ordered(of_axis, axis)]
+    points = _ordered([level for level in perturbations.levels if level.label != NOMINAL], axis)
+    parts = np.array_split(np.arange(len(points)), min(MAX_GROUPS, len(points)))
+    return [
+        _Group(tuple(points[i].values[axis.name] for i in part), tuple(points[i].label for i in part)) for part in parts
+    ]
+
+
+def _ordered(levels: Sequence[PerturbedLevel], axis: PerturbedAxis) -> list[PerturbedLevel]:
+    return sorted(levels, key=lambda level: level.values[axis.name])
+
+
+def _perturbs_only(level: PerturbedLevel, axis: PerturbedAxis, perturbations: Perturbations) -> bool:
+    others = [other for other in perturbations.axes if other is not axis]
+    return all(level.values[other.name] == other.nominal for other in others)
+
+
+def _sides(axis: PerturbedAxis, points: Sequence[CurvePoint], wanted: float) -> tuple[FittedSide, ...]:
+    known = [point for point in points if point.success.estimate is not None]
+    above = [point for point in known if point.value >= axis.nominal]
+    below = [point for point in reversed(known) if point.value <= axis.nominal]
+    return tuple(_side(side, wanted) for side in (below, above) if any(point.value != axis.nominal for point in side))
+
+
+def _side(points: Sequence[CurvePoint], wanted: float) -> FittedSide:
+    """Returns the fit of points in the order of their distance from the nominal value."""
+    estimates = [point.success.estimate for point in points if point.success.estimate is not None]
+    rates = fitted_rates([found.value for found in estimates], [point.success.counts.counted for point in points])
+    values = [point.value for point in points]
+    below = [index for index, rate in enumerate(rates) if rate < wanted]
+    first = below[0] if below else None
+    kind, crossing = CrossingKind.NOT_REACHED, None
+    if first == 0:
+        kind = CrossingKind.AT_NOMINAL
+    elif first is not None:
+        kind = CrossingKind.WITHIN
+        fraction = (rates[first - 1] - wanted) / (rates[first - 1] - rates[first])
+        crossing = values[first - 1] + fraction * (values[first] - values[first - 1])
+    intervals = [found.interval for found in estimates]
+    # Both claims go through the levels in order, and need no correction for their number: each level is a condition.
+    reached_count = sum(1 for _ in takewhile(lambda found: found and found.low >= wanted, intervals))
+    below_count = sum(1 for _ in takewhile(lambda found: found and found.high < wanted, reversed(intervals)))
+    return FittedSide(
+        values=tuple(values),
+        rates=rates,
+        kind=kind,
+        crossing=crossing,
+        last_reached=values[-1] if first is None else values[first - 1] if first else None,
+        first_below=None if first is None else values[first],
+        shown_reached=values[reached_count - 1] if reached_count else None,
+        shown_below=values[-below_count] if below_count else None,
+    )
+
+
+def fitted_rates(rates: Sequence[float], weights: Sequence[float]) -> tuple[float, ...]:
+    """Returns the weighted least-squares fit that never rises (pool adjacent violators).
+
+    Args:
+        rates: Success rates in the order of the distance from the nominal value.
+        weights: Number of episodes of each rate.
+    """
+    fit = optimize.isotonic_regression(np.asarray(rates), weights=np.asarray(weights, dtype=float), increasing=False)
+    return tuple(float(rate) for rate in fit.x)
+
+
+def _order(curves: Sequence[RobustnessCurve]) -> tuple[str, ...]:
+    falls: dict[str, list[float]] = {}
+    for curve in curves:
+        falls.setdefault(curve.axis.name, []).extend([] if curve.fall is None else [curve.fall.points.value])
+    return tuple(sorted(falls, key=lambda name: -float(np.mean(falls[name])) if falls[name] else 0.0))
