@@ -104,7 +104,7 @@ def test_a_surface_that_never_slides_keeps_its_friction() -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("<sdf", "got no XML"),
+        ("<sdf", "not an XML document"),
         ("<sdf version='1.6'><model name='m'><include><uri>model://can</uri></include></model></sdf>", "<include>"),
     ],
 )

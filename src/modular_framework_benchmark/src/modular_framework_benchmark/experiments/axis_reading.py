@@ -70,7 +70,9 @@ def read_axis(axis: PerturbationAxis, node: Node, design: str, reading: ValueRea
         return None
     known = corrected_keys(mapping, AXIS_KEYS, f"the key of {axis.name}", reading.faults).entries
     if "unit" not in known:
-        text = f"the axis {axis.name} has no unit; {listing(axis.units)}; add it, such as unit: {next(iter(axis.units))}"
+        text = (
+            f"the axis {axis.name} has no unit; {listing(axis.units)}; add it, such as unit: {next(iter(axis.units))}"
+        )
         reading.faults.add(node.location, text)
         return None
     unit = reading.choice(known["unit"], f"the unit of {axis.name}", axis.units)
