@@ -11,7 +11,7 @@ import pytest
 
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -42,7 +42,7 @@ def gantry() -> RobotModel:
     return RobotModel(f'<robot name="gantry"><link name="frame"/>{x}{y}</robot>', srdf)
 
 
-class AlongTheWay:
+class AlongTheWay(Planner):
     """A planner whose path is WAY, the first vertices of it a way out of a collision."""
 
     def __init__(self, path_prefix: int) -> None:

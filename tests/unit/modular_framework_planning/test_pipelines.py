@@ -25,7 +25,7 @@ from modular_framework_planning.planners.ompl.planner import search_threads
 from modular_framework_planning.planners.ompl.planner_settings import PLANNERS, parameter_faults
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -170,7 +170,7 @@ def test_settings_of_a_group_come_before_those_of_all() -> None:
     assert copy.get("RRT", "arm") == store.get("RRT", "arm")
 
 
-class Straight:
+class Straight(Planner):
     """A user's planner: the straight way."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
@@ -208,7 +208,8 @@ def test_an_unknown_adapter_is_refused_with_the_list(names: str, part: str) -> N
         ("chomp_interface/CHOMPPlanner", "ompl_interface/OMPLPlanner"),
         ("ompl_interface::OMPL", "did you mean 'ompl_interface/OMPLPlanner'"),
         ("Nothing", "module/Class"),
-        ("json/JSONDecoder", "no method plan"),
+        ("json/JSONDecoder", "JSONDecoder is not derived from .*planner_interface.Planner"),
+        (f"{Planner.__module__}/Planner", "Planner does not define plan"),
         ("this_module_is_missing/Planner", "this_module_is_missing"),
     ],
 )

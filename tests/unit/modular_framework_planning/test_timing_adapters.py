@@ -12,7 +12,7 @@ import pytest
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -56,7 +56,7 @@ BETWEEN = ((1.57, -1.3, 0.8, -1.2, -1.57, 0.0), (0.8, -1.3, 0.8, -1.6, -1.3, 0.8
 JERK = 60.0
 
 
-class OverTwoPoints:
+class OverTwoPoints(Planner):
     """A planner whose path goes over two given points."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
@@ -281,7 +281,7 @@ def nearest(motion: Trajectory, values: np.ndarray) -> np.ndarray:
 def test_a_trajectory_of_the_planner_is_slowed_too_but_not_timed_anew(model: RobotModel) -> None:
     names = model.group(GROUP).joints
 
-    class Timed:
+    class Timed(Planner):
         def plan(self, problem: PlanningProblem) -> Trajectory:
             return parameterize(
                 names, np.array([START, GOAL]), np.zeros(0), problem.max_velocity, problem.max_acceleration

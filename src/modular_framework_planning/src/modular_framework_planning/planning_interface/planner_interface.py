@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Interface between pipelines and planners: planning problem, planned path, planner and validator protocols."""
+"""Interface between pipelines and planners: planning problem, planned path, planner and validator."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice, product
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -261,26 +262,77 @@ class PlannedPath:
     keep_shape: bool = False
 
 
-@runtime_checkable
-class Planner(Protocol):
-    """A planner.
+class Planner(ABC):
+    """Base class of planners; only `plan` is required.
 
-    Optional members of a planner class:
-        planner_ids: Accepted planner names; all names if absent or empty.
+    Attributes:
+        description: Description for clients; empty for the name of the class.
+        planner_ids: Accepted planner names; empty if the planner accepts any name.
         improving_ids: Names of the planners that improve their path until the time is over.
-        replaces_bad_values: Whether an unknown planner_id or a scaling factor out of range is replaced by the default
-            with a warning, as in OMPL's planning contexts (the default), or raises an error.
-        configure(model, settings): Class method that creates the planner; by default it is created without arguments.
+        constrained_planner: Name of the search that replaces a planner if the planner cannot satisfy path constraints;
+            empty if there is none.
         auxiliary_constraints: Names of path constraints that are planner inputs, such as the interim point of an arc,
             and do not constrain the motion.
-        collision_code: Error code for a start or goal in collision, if it differs from the usual code.
-        repaired(problem, vertices): Returns the path with all edges valid at the step of the final validation, or
-            raises EdgeError. Without this method, an invalid motion is a failure of the planner.
+        replaces_bad_values: Whether an unknown planner_id or a scaling factor out of range is replaced by the default
+            with a warning, as in OMPL's planning contexts, or raises an error.
+        repairs_edges: Whether `repaired` is implemented. Without it, an invalid motion is a failure of the planner.
+        collision_code: Error code for a start or goal in collision; None for the usual code.
     """
 
+    description: str = ""
+    planner_ids: tuple[str, ...] = ()
+    improving_ids: Collection[str] = ()
+    constrained_planner: str = ""
+    auxiliary_constraints: tuple[str, ...] = ()
+    replaces_bad_values: bool = True
+    repairs_edges: bool = False
+    collision_code: ErrorCode | None = None
+
+    @classmethod
+    def configure(cls, model: RobotModel, settings: PipelineSettings) -> Planner:  # noqa: ARG003
+        """Creates the planner of a pipeline.
+
+        Args:
+            model: Robot model.
+            settings: Settings of the pipeline.
+
+        Raises:
+            PlanningError: A parameter of the planner is invalid.
+        """
+        return cls()
+
+    @staticmethod
+    def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:  # noqa: ARG004
+        """Returns one message per invalid setting of a planner.
+
+        Args:
+            planner_id: Name of the planner.
+            settings: Settings of the planner by name.
+        """
+        return []
+
+    @abstractmethod
     def plan(self, problem: PlanningProblem) -> PlannedPath | Trajectory:
-        """Returns a path to be timed, or a trajectory to be returned unchanged; raises PlanningError on failure."""
-        ...
+        """Returns a path to be timed, or a trajectory to be returned unchanged.
+
+        Args:
+            problem: Planning problem.
+
+        Raises:
+            PlanningError: There is no path; gives error code and reason.
+        """
+
+    def repaired(self, problem: PlanningProblem, vertices: Array) -> Array:
+        """Returns the path with all edges valid at the step of the final validation.
+
+        Args:
+            problem: Planning problem of the path.
+            vertices: Joint vectors from start to goal, shape (n, joints).
+
+        Raises:
+            EdgeError: An edge could not be repaired.
+        """
+        raise NotImplementedError
 
 
 PlanNext = Callable[[PlanningProblem], PlannedPath]

@@ -29,7 +29,6 @@ class PathSearch:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._path: PlannedPath | None = None
-        self.repairs = hasattr(planner, "repaired")
 
     def __call__(self, problem: PlanningProblem) -> PlannedPath:
         """Returns the path; later calls repair the same path instead of planning again."""
@@ -49,9 +48,9 @@ class PathSearch:
         simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
         if simplify:  # leaves fewer edges to repair
             vertices = _shortened(problem, vertices, _without_vertices)
-        if self.repairs:
+        if self._planner.repairs_edges:
             with problem.phases.measured(REPAIR):
-                vertices = self._planner.repaired(problem, vertices)  # type: ignore[attr-defined]
+                vertices = self._planner.repaired(problem, vertices)
         if simplify and problem.constraints is not None:
             vertices = _shortened(problem, vertices, _cut_along_constraints)
         if simplify:

@@ -86,22 +86,17 @@ class PlanningPipeline:
     @property
     def planner_ids(self) -> tuple[str, ...]:
         """Accepted values of planner_id; empty if the planner accepts any value."""
-        return tuple(getattr(self._planner, "planner_ids", ()))
+        return self._planner.planner_ids
 
     @property
     def description(self) -> str:
         """Description of the planner."""
-        return str(getattr(self._planner, "description", type(self._planner).__name__))
-
-    @property
-    def _replaces_bad_values(self) -> bool:
-        """Whether an unknown planner_id and invalid scaling factors are replaced by defaults with a warning."""
-        return bool(getattr(self._planner, "replaces_bad_values", True))
+        return self._planner.description or type(self._planner).__name__
 
     @property
     def auxiliary_constraints(self) -> tuple[str, ...]:
         """Names of path constraints that are planner inputs and do not constrain the motion."""
-        return tuple(getattr(self._planner, "auxiliary_constraints", ()))
+        return self._planner.auxiliary_constraints
 
     def group_planners(self, group: str) -> tuple[str, ...]:
         """Returns the planner_configs of a group, without those whose planner does not exist."""
@@ -110,10 +105,8 @@ class PlanningPipeline:
         return tuple(name for name in names if not allowed or self._configuration(name, group)[0] in allowed)
 
     def parameter_faults(self, name: str, group: str = "") -> list[str]:
-        """Returns a message per invalid setting of a planner; none if the planner has no check."""
-        planner_id, parameters = self._configuration(name, group)
-        check = getattr(self._planner, "parameter_faults", None)
-        return list(check(planner_id, parameters)) if check else []
+        """Returns one message per invalid setting of a planner."""
+        return self._planner.parameter_faults(*self._configuration(name, group))
 
     def plan(self, request: PlanningRequest, repeatable: bool = False) -> PlanningResult:
         """Returns a validated motion, never a partial result.
@@ -130,8 +123,8 @@ class PlanningPipeline:
             return self._plan(request, repeatable, phases)
         except PlanningError as error:
             error.statistics = phases.statistics()
-            code = getattr(self._planner, "collision_code", error.code)
-            if error.code in COLLISIONS and code != error.code:
+            code = self._planner.collision_code
+            if error.code in COLLISIONS and code is not None:
                 raise PlanningError(code, error.reason, error.contacts, error.statistics) from error
             raise
 
@@ -159,7 +152,7 @@ class PlanningPipeline:
                     return answer
                 if path.keep_shape or problem.cancelled() or time.monotonic() > problem.end_s:
                     break
-                if search.repairs:  # repair again with a finer step
+                if self._planner.repairs_edges:  # repair again with a finer step
                     problem = replace(
                         problem, settings=replace(problem.settings, motion_step=problem.settings.motion_step / 4.0)
                     )
@@ -295,7 +288,7 @@ class PlanningPipeline:
 
     def _reserved_s(self, allowed_time_s: float, planner_id: str) -> float:
         """Returns the time reserved for path repair, time parameterization and validation [s]."""
-        improves = planner_id in getattr(self._planner, "improving_ids", ())
+        improves = planner_id in self._planner.improving_ids
         return min(RESERVED_IMPROVING_S if improves else RESERVED_S, RESERVED_FRACTION * allowed_time_s)
 
     def _chosen_planner(self, requested: str, group: str) -> tuple[str, dict[str, Any], str]:
@@ -303,7 +296,7 @@ class PlanningPipeline:
         default, allowed = self.settings.default_planner(group), self.planner_ids
         planner_id, parameters = self._configuration(without_group(requested or default), group)
         replaced = ""
-        if requested and allowed and planner_id not in allowed and self._replaces_bad_values:
+        if requested and allowed and planner_id not in allowed and self._planner.replaces_bad_values:
             planner_id, parameters = self._configuration(without_group(default), group)
             replaced = requested
             LOGGER.warning(
@@ -339,7 +332,7 @@ class PlanningPipeline:
                 self.settings.default_acceleration_scaling_factor,
             ),
         ):
-            if np.isfinite(value) and not 0.0 <= value <= 1.0 and self._replaces_bad_values:
+            if np.isfinite(value) and not 0.0 <= value <= 1.0 and self._planner.replaces_bad_values:
                 LOGGER.warning(
                     "%s is %g; it must be in (0, 1], or 0 for the default %g; 1 is used", name, value, default
                 )

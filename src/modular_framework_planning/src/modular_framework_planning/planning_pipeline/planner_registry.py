@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -127,13 +127,13 @@ class PlannerRegistry:
             resolved: Resolved planner.
             settings: Settings to check; None for the settings of the planner.
         """
-        check = getattr(planner_class(resolved.plugin), "parameter_faults", None)
-        return list(check(resolved.planner, resolved.settings if settings is None else settings)) if check else []
+        checked = resolved.settings if settings is None else settings
+        return planner_class(resolved.plugin).parameter_faults(resolved.planner, checked)
 
     @staticmethod
     def constrained_planner(resolved: ResolvedPlanner) -> str:
         """Returns the search used if a planner cannot satisfy the path constraints, empty if none."""
-        return str(getattr(planner_class(resolved.plugin), "constrained_planner", ""))
+        return planner_class(resolved.plugin).constrained_planner
 
     def adapter_faults(self, pipelines: Iterable[str]) -> dict[str, str]:
         """Returns messages about invalid plugins and request adapters of pipelines, keyed by PIPELINE/PARAMETER."""
@@ -142,7 +142,7 @@ class PlannerRegistry:
             spec = self.specs.get(name)
             if spec is None:
                 continue
-            checks = {
+            checks: dict[str, Callable[[], object]] = {
                 "planning_plugin": partial(planner_class, spec.planner),
                 "request_adapters": partial(make_adapters, spec.adapters),
             }

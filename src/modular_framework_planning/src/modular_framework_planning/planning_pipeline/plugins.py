@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.planning_interface.planner_interface import Planner
@@ -34,6 +33,7 @@ ADAPTERS = (
 )
 # MoveIt adapters that are accepted without effect, with the reason.
 NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
+PLANNER = f"{Planner.__module__}.{Planner.__name__}"
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 MOVEIT_ADAPTERS = "default_planner_request_adapters"
 DEFAULT_ADAPTERS = " ".join(
@@ -54,26 +54,28 @@ def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> 
 
     Args:
         plugin: Parameter `planning_plugin`: a key of PLANNERS, with "/" or "::", or `module/Class`.
-        model: Robot model, passed to the planner's optional method `configure`.
-        settings: Settings of the pipeline, passed to `configure`.
+        model: Robot model.
+        settings: Settings of the pipeline.
 
     Raises:
-        ModelError: The class does not exist or has no method `plan`; lists the allowed names.
+        ModelError: The class does not exist or is not derived from `Planner`; lists the allowed names.
         PlanningError: A parameter of the planner is invalid.
     """
-    planner_type = planner_class(plugin)
-    planner: Planner = planner_type.configure(model, settings) if hasattr(planner_type, "configure") else planner_type()
-    return planner
+    return planner_class(plugin).configure(model, settings)
 
 
-def planner_class(plugin: str) -> Any:
+def planner_class(plugin: str) -> type[Planner]:
     """Returns the planner class of a planning_plugin; raises ModelError as `make_planner` does."""
     name = plugin.replace("::", "/")
-    allowed = f"allowed: {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
+    allowed = f"allowed: {', '.join(sorted(PLANNERS))} and module/Class of a class derived from {PLANNER}"
     allowed += nearest(name, PLANNERS)
     planner_type = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", allowed)
-    if not callable(getattr(planner_type, "plan", None)):
-        raise ModelError(f"planning_plugin '{plugin}': class {planner_type.__name__} has no method plan; {allowed}")
+    if not issubclass(planner_type, Planner):
+        raise ModelError(
+            f"planning_plugin '{plugin}': {planner_type.__name__} is not derived from {PLANNER}; {allowed}"
+        )
+    if missing := sorted(planner_type.__abstractmethods__):
+        raise ModelError(f"planning_plugin '{plugin}': {planner_type.__name__} does not define {', '.join(missing)}")
     return planner_type
 
 

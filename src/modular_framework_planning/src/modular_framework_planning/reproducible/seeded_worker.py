@@ -25,7 +25,7 @@ from pinocchio import SE3 as Transform
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -145,7 +145,7 @@ def _wait_for_children(*_: object) -> None:
             pass
 
 
-class _StraightLinePlanner:
+class _StraightLinePlanner(Planner):
     """Planner without OMPL, whose random generator must stay unused in the worker."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:

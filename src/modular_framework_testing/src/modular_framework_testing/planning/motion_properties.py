@@ -19,6 +19,7 @@ from modular_framework_planning.kinematics.inverse_kinematics import KinematicsP
 from modular_framework_planning.planners.ompl.planner import OmplPlanner
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planners.stomp.planner import StompPlanner
+from modular_framework_planning.planning_interface.planner_interface import Planner
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PipelineSettings,
@@ -74,10 +75,10 @@ def make_pipeline(model: RobotModel, kind: str, seed: int) -> PlanningPipeline:
         seed: Seed of the pipeline.
     """
     settings = PipelineSettings(seed=seed, robot_planning={"cartesian_limits": CARTESIAN_LIMITS})
-    planner = {"ompl": OmplPlanner, "stomp": StompPlanner}.get(kind, CommandPlanner)
+    kinds: dict[str, type[Planner]] = {"ompl": OmplPlanner, "stomp": StompPlanner}
     adapters = () if kind in ("ptp", "lin") else make_adapters()
-    made = planner.configure(model, settings) if hasattr(planner, "configure") else planner()
-    return PlanningPipeline(KinematicsPool(model), settings, made, adapters=adapters)
+    planner = kinds.get(kind, CommandPlanner)
+    return PlanningPipeline(KinematicsPool(model), settings, planner.configure(model, settings), adapters=adapters)
 
 
 def _world(model: RobotModel, rng: np.random.Generator) -> tuple[PlanningScene, list[tuple[str, Solid, np.ndarray]]]:

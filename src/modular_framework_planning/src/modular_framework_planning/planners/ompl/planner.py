@@ -36,7 +36,12 @@ from modular_framework_planning.planners.rrt_connect.rrt_connect import (
     can_search,
 )
 from modular_framework_planning.planning_interface.path_repair import repaired
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
+from modular_framework_planning.planning_interface.planner_interface import (
+    PlannedPath,
+    Planner,
+    PlanningProblem,
+    no_path,
+)
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # limits of the search for a detour around one edge
@@ -45,7 +50,7 @@ MAX_THREADS = 4  # default limit; every additional search saves less time
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
-class OmplPlanner:
+class OmplPlanner(Planner):
     """Plans with OMPL's sampling-based planners.
 
     Parameters of a planner configuration or of the group: the planner's settings (see planner_settings.py),
@@ -58,7 +63,7 @@ class OmplPlanner:
     improving_ids = ANYTIME
     description = "OMPL"
     constrained_planner = NAME
-    """Search that replaces a planner if the planner cannot satisfy the path constraints of a request."""
+    repairs_edges = True
 
     @staticmethod
     def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
@@ -94,8 +99,7 @@ class OmplPlanner:
                 return PlannedPath(min(paths, key=path_length))
         raise no_path(problem, problem.planner_id, total_checks)
 
-    @staticmethod
-    def repaired(problem: PlanningProblem, vertices: Array) -> Array:
+    def repaired(self, problem: PlanningProblem, vertices: Array) -> Array:
         """Returns the path with invalid edges replaced by detours, valid at the step of the final validation.
 
         Raises:

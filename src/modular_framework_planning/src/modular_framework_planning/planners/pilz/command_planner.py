@@ -26,7 +26,7 @@ from modular_framework_planning.planners.pilz.pose_path import (
     arc_around_centre,
     arc_through_interim,
 )
-from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
+from modular_framework_planning.planning_interface.planner_interface import Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PoseGoal
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -45,7 +45,7 @@ class _Target:
     carried: Transform | None = None
 
 
-class CommandPlanner:
+class CommandPlanner(Planner):
     """Plans PTP, LIN and CIRC."""
 
     planner_ids = ("PTP", "LIN", "CIRC")

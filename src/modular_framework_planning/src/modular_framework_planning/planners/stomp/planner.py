@@ -13,7 +13,12 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.stomp.costs import StateCosts
 from modular_framework_planning.planners.stomp.optimiser import Optimiser
 from modular_framework_planning.planners.stomp.settings import StompSettings, read_settings
-from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
+from modular_framework_planning.planning_interface.planner_interface import (
+    PlannedPath,
+    Planner,
+    PlanningProblem,
+    no_path,
+)
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -22,7 +27,7 @@ NOISE_DECAY = 0.93  # noise factor after an iteration without progress
 NOISE_SCALES = (1.0, 0.5, 0.25)  # noise factors of consecutive copies
 
 
-class StompPlanner:
+class StompPlanner(Planner):
     """Plans by stochastic optimisation; see StompSettings and read_settings for the parameters."""
 
     planner_ids = ("stomp", "STOMP")
