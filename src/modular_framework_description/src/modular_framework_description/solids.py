@@ -138,7 +138,7 @@ def unit_inertia(part: Part) -> Array:
 
 
 def ring_of_boxes(radius: float, thickness: float, height: float, count: int, z: float) -> tuple[Part, ...]:
-    """Returns boxes on a circle as the wall of a hollow cylinder.
+    """Returns boxes arranged in a circle that form the wall of a hollow cylinder.
 
     Args:
         radius: Outer radius, at the middle of each outer face [m].

@@ -69,7 +69,9 @@ def resolved(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str,
 
 
 def with_leaders(values: Mapping[str, float], mimics: Mapping[str, Mimic]) -> dict[str, float]:
-    """Returns joint positions with mimic joints replaced by their leaders. A leader's given position takes precedence.
+    """Returns joint positions with mimic joints replaced by their leaders.
+
+    If `values` contains a leader, that position takes precedence.
 
     Args:
         values: Positions by joint [rad or m].

@@ -45,7 +45,7 @@ class Ros2ControlHardware:
         name: Name of the hardware.
         plugin: Plugin of the hardware.
         parameters: Parameters of the hardware.
-        joints: Joints without mimic joints.
+        joints: Joints, excluding mimic joints.
     """
 
     name: str

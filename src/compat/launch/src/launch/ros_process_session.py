@@ -67,7 +67,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
 
     @property
     def running(self) -> list[RunningProcess]:
-        """Returns the processes that run or wait for their respawn."""
+        """Returns the processes that are running or waiting to respawn."""
         with self._lock:
             return list(self._running.values())
 
@@ -138,7 +138,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
             with self._lock:
                 self._running[process.name] = running
             parent.pm.register(process)
-            process.start()  # an immediate exit is reported as any other exit
+            process.start()  # an immediate exit is reported like any other exit
         except (roslaunch.core.RLException, roslaunch.node_args.NodeParamsException) as error:
             raise LaunchError(f"{request.name}: {error}") from error
         return running

@@ -7,7 +7,7 @@ error rate, for any number of interim analyses. The inverse of the capital again
 contains every m whose capital stays below 1 / error rate. The bet is a fixed mixture over bet sizes, so the results
 depend on the differences and not on their order.
 Source: I. Waudby-Smith, A. Ramdas, Estimating means of bounded random variables by betting, J. R. Statist. Soc. B 86
-(2024) 1-27. For pairs of 0 and 1 and m = 0, the test is the mixture sequential probability ratio test of the fraction
+(2024) 1-27. For binary results and m = 0, the test is the mixture sequential probability ratio test of the fraction
 of discordant pairs that the first method wins.
 """
 
@@ -47,7 +47,7 @@ def _gains(differences: Floats, true_difference: float | Floats) -> Floats:
     """Returns the logarithmic gain of each bet size for each difference, shape (..., sizes, k).
 
     Args:
-        differences: Differences of a pair, shape (k,).
+        differences: Possible differences between the two results of a pair, shape (k,).
         true_difference: Hypothetical mean difference, scalar or shape (..., 1, 1).
     """
     sizes = _BET_SIZES[:, None]

@@ -94,7 +94,7 @@ class SimpleTransmission(Transmission):
 
 @dataclass(frozen=True)
 class _PairTransmission(Transmission):
-    """Two actuators move two joints; positions follow the formulas of velocities with offsets.
+    """Two actuators move two joints; positions use the formulas of the velocities, plus the offsets.
 
     Attributes:
         actuator_reduction: Ratios n_a1, n_a2.

@@ -52,7 +52,7 @@ class LoopReport:
         self._thread = threading.Thread(target=self._run, name="loop_report", daemon=True)
 
     def connect(self) -> None:
-        """Opens the topic and the service, and starts publishing."""
+        """Advertises the topic and the service, and starts publishing."""
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
         self._service = rospy.Service("~reset_statistics", Empty, self._on_reset)
         self._thread.start()

@@ -93,7 +93,8 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
         name: Name of the group.
 
     Raises:
-        RobotModelError: A text is invalid, the group is unknown, or it refers to an unknown group, joint or link.
+        RobotModelError: A description is invalid, the group is unknown, or the group refers to an unknown group, joint
+            or link.
     """
     try:
         robot = read_urdf(urdf, "robot_description (URDF)")

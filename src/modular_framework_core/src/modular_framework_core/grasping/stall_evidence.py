@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from modular_framework_core.grasping.grasp_server import Outcome
 
 MOVED_FRACTION = 0.2
-"""Minimum motion that counts as moved, as a fraction of the position tolerance."""
+"""Minimum displacement that counts as motion, as a fraction of the position tolerance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +52,16 @@ class StallEvidence:
     def judge(self, outcome: Outcome, attempt: Attempt) -> Outcome:
         """Rejects a stall that a lack of torque may have caused.
 
-        A stall is accepted under one of these conditions: the fingers press; they still hold the object of the last
-        stall; a joint that did not reach its target has moved towards the target; or this joint has moved in the same
-        direction before with at most the same effort.
+        A stall is accepted if the controller reports a pressing force, or if the fingers still hold the object of the
+        last stall. It is also accepted if a joint stopped short of its target, and either moved towards the target now,
+        or moved in this direction before with the same or less effort.
 
         Args:
             outcome: Result reported by the controller.
             attempt: Commanded motion.
 
         Returns:
-            The outcome; for a rejected stall, `stalled` is False and the text has the reason.
+            The outcome; for a rejected stall, `stalled` is False and `text` gives the reason.
         """
         judged = outcome
         if outcome.stalled and not (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Types of state options, with checks that describe the fault of a value."""
+"""Types of state options, and checks that explain why a value is invalid."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def construct_task(
 
 
 def directories_from(text: str) -> list[Path]:
-    """Returns the directories in a text that separates them by ``:`` as in PATH."""
+    """Splits a colon-separated list of directories, as in PATH."""
     return [Path(part).expanduser() for part in text.split(":") if part.strip()]
 
 
@@ -91,11 +91,11 @@ def main(arguments: Sequence[str], planners_of: Callable[[str], PlannerNames | N
 
     Args:
         arguments: Command-line arguments.
-        planners_of: Function that returns the planners of a MoveIt configuration package, "" for the package in the
-            API package's launch file; None if planners are not checked.
+        planners_of: Function that returns the planners of a MoveIt configuration package, or None to skip the check of
+            planners. The name "" means the package in the launch file of the API package.
 
     Returns:
-        Exit code: 0 for success, 1 for a fault in the task or its inputs, 2 for a wrong command line.
+        Exit code: 0 for success, 1 for a fault in the task or its inputs, 2 for a usage error.
     """
     parser = _parser()
     args = parser.parse_args([argument for argument in arguments if ":=" not in argument])

@@ -116,7 +116,7 @@ class ChainModel:
         return not self._is_external.any()
 
     def with_positions(self, positions: Array) -> Chain:
-        """Returns the chain with joints outside the group at their values in `positions` of the whole robot."""
+        """Returns the chain with all joints outside the group fixed at `positions` (positions of the whole robot)."""
         if self.is_independent:
             return self._chain
         return self._chain._replace(offsets=np.where(self._is_external, positions[self.positions], self._chain.offsets))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reader for pickup and place goals, which become manoeuvres; errors name the field of the message."""
+"""Converts pickup and place goals to manoeuvres; errors name the message field."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
 
 
 def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> SceneChange:
-    """Returns the change that allows contact of the hand with the object and other bodies, and object with support."""
+    """Returns the scene change that allows the hand to touch given bodies, and the object to touch its support."""
     surface, others = goal.support_surface_name, [target, *goal.allowed_touch_objects, *touched]
     if surface and goal.allow_gripper_support_collision:
         others.append(surface)

@@ -63,7 +63,7 @@ class PlanningPipeline:
         name: str = "ompl",
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
     ) -> None:
-        """Stores the parts, which PipelineSpec creates from their names.
+        """Stores the components that PipelineSpec has created by name.
 
         Args:
             model: Robot model.
@@ -113,7 +113,8 @@ class PlanningPipeline:
 
         Args:
             request: Planning request.
-            repeatable: Whether iterations bound the searches. A search that the clock stops then fails.
+            repeatable: Whether iterations instead of time limit the searches. A search that reaches the time limit then
+                counts as failed.
 
         Raises:
             PlanningError: Planning failed; gives error code and reason.
@@ -129,7 +130,7 @@ class PlanningPipeline:
             raise
 
     def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningResult:
-        """Searches and repairs until a motion passes the final validation or the time is over."""
+        """Repeats search and repair until a motion passes the final validation or time runs out."""
         start_s = time.monotonic()
         with phases.measured(SETUP):
             problem = self._problem(request, start_s, repeatable, phases)
@@ -169,7 +170,7 @@ class PlanningPipeline:
         return LimitMaxCartesianLinkSpeed(), *self._adapters
 
     def _steps(self) -> tuple[float, ...]:
-        """Returns the edge steps of consecutive searches; a search follows if an edge could not be repaired."""
+        """Returns the edge step of each search; an edge that cannot be repaired begins the next search."""
         finest = self.settings.finest_step
         return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
@@ -201,7 +202,7 @@ class PlanningPipeline:
     def checker(
         self, scene: PlanningScene, group: JointGroup, start: Array, check_interrupt: Callable[[], None] = lambda: None
     ) -> CollisionChecker:
-        """Returns the collision checker of a motion, which tolerates shallow contacts of attached objects.
+        """Returns a collision checker for the motion; it tolerates shallow contacts of attached objects.
 
         Args:
             scene: Planning scene.
@@ -210,7 +211,7 @@ class PlanningPipeline:
             check_interrupt: Function called regularly during the build; it raises an exception to stop the build.
 
         Raises:
-            PlanningError: Bodies touch at the start that the group cannot separate.
+            PlanningError: Bodies are in contact at the start, and no motion of the group can separate them.
         """
         checker = self._new_checker(scene, group.indices)
         checker.build(check_interrupt)
@@ -292,7 +293,7 @@ class PlanningPipeline:
         return min(RESERVED_IMPROVING_S if improves else RESERVED_S, RESERVED_FRACTION * allowed_time_s)
 
     def _chosen_planner(self, requested: str, group: str) -> tuple[str, dict[str, Any], str]:
-        """Returns the planner name, its settings and the replaced name; raises PlanningError for an unknown name."""
+        """Returns the planner name, its settings, and the requested name if the default planner replaces it."""
         default, allowed = self.settings.default_planner(group), self.planner_ids
         planner_id, parameters = self._configuration(without_group(requested or default), group)
         replaced = ""
@@ -367,7 +368,7 @@ def _require_time(request: PlanningRequest, begun_s: float) -> None:
 
 
 def _with_fault(error: PlanningError, fault: str) -> PlanningError:
-    """Returns the error with the fault of an earlier path of the same request appended."""
+    """Appends the fault of an earlier path of the same request to an error."""
     if not fault:
         return error
     return PlanningError(error.code, f"{error.reason}; a path was found before, but {fault}", error.contacts)

@@ -69,7 +69,7 @@ def curve_values(times: Array, coefficients: Array, sample_times: Array, order_c
 
 @njit(cache=True, nogil=True)
 def curve_samples(times: Array, coefficients: Array, positions: Array, velocities: Array, step: float) -> Array:
-    """Samples positions along the curve, with steps of about `step` at most, shape (m, joints).
+    """Samples positions along the curve, in steps of at most about `step`, shape (m, joints).
 
     Args:
         times: Times of the points, shape (n,), n > 1 [s].

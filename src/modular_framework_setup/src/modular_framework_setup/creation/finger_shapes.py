@@ -14,7 +14,7 @@ from modular_framework_setup.creation.robot_parts import Gripper
 
 
 def with_gripper(model: RobotModel, state: Array, gripper: Gripper, position: float) -> Array:
-    """Returns joint positions with a gripper moved.
+    """Returns joint positions after moving a gripper.
 
     Args:
         model: Robot model.

@@ -20,7 +20,7 @@ _MAX_RATE_HZ = 1e6
 
 @dataclass(frozen=True, slots=True)
 class PhysicsValues:
-    """Physics settings by public names.
+    """Physics settings, named as in Gazebo.
 
     The physics engine does not support the settings that have a default below; they read as 0 and have no effect.
 
@@ -101,7 +101,7 @@ class AdjustablePhysics:
         """Applies settings.
 
         Returns:
-            Names of unsupported settings with given values, which have no effect.
+            Names of the unsupported settings in the request, which are ignored.
 
         Raises:
             ValueError: A value is out of range; no setting has changed.

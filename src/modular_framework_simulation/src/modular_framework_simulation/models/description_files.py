@@ -19,8 +19,8 @@ _SDF_TAGS = ("sdf", "gazebo")
 def description_files(path: Path, resources: Resources) -> tuple[Path, ...]:
     """Returns a world or model file and all files that it names, directly or through included models.
 
-    Included models count with their model.config, meshes with their images, and material scripts with all files of
-    their folders. References that lead nowhere are skipped, because only the reader decides whether they are faults.
+    An included model adds its model.config, a mesh adds its images, and a material script adds all files in its
+    folders. Unresolved references are skipped; the reader decides whether they are errors.
 
     Args:
         path: SDF file.
@@ -32,7 +32,7 @@ def description_files(path: Path, resources: Resources) -> tuple[Path, ...]:
 
 
 def files_in_description(text: str, resources: Resources) -> tuple[Path, ...]:
-    """Returns the files that the text of a robot description (URDF) or model (SDF) names, as `description_files`.
+    """Returns the files that a robot description (URDF) or model (SDF) refers to, found as in `description_files`.
 
     Args:
         text: URDF or SDF text.
@@ -47,7 +47,7 @@ def files_in_description(text: str, resources: Resources) -> tuple[Path, ...]:
 
 
 def _add_description(path: Path, resources: Resources, files: dict[Path, None]) -> None:
-    if path in files:  # also ends circles of includes
+    if path in files:  # also breaks include cycles
         return
     files[path] = None
     try:

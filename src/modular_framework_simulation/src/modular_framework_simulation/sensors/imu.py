@@ -35,7 +35,7 @@ class ImuSensor(Sensor):
         rate_noise: Noise of the angular velocity about x, y, z [rad/s].
         acceleration_noise: Noise of the specific force along x, y, z [m/s^2].
         orientation_noise: Noise of the elements of the quaternion.
-        offset_rotation: Rotation that is multiplied from the left to the orientation, as a quaternion xyzw.
+        offset_rotation: Rotation that left-multiplies the orientation, as a quaternion xyzw.
         from_initial: Whether the orientation is relative to the initial orientation, instead of the world frame.
     """
 
@@ -90,7 +90,7 @@ def _noises(xml: SensorXml, kind: str) -> Noises:
 
 
 def _read_sensor_plugin(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
-    """Reads libgazebo_ros_imu_sensor.so, whose topics are always in the namespace."""
+    """Reads libgazebo_ros_imu_sensor.so, whose topics are always relative to the robot namespace."""
     plugin = xml.plugin
     assert plugin is not None
     namespace = xml.namespace() or f"/{xml.model.name}"
@@ -152,7 +152,7 @@ def _with_more_noise(sensor: ImuSensor, rates: float, accelerations: float) -> I
 
 
 class Imu:
-    """Measures with an inertial measurement unit.
+    """Simulates an inertial measurement unit.
 
     Args:
         world: World of the sensor.

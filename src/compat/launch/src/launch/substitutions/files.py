@@ -137,10 +137,10 @@ class Command(SubstitutionOfText):
 
 
 class PythonExpression(SubstitutionOfText):
-    """Value of a Python expression, as a text.
+    """Value of a Python expression, as a string.
 
     Args:
-        expression: The expression; texts from substitutions need quotes.
+        expression: The expression; strings from substitutions need quotes.
         python_modules: Modules for the expression; names of `math` need no prefix.
     """
 

@@ -41,7 +41,7 @@ class PickupAction(ManipulationAction):
 
 
 def _check(scene: PlanningScene, goal: PickupGoal) -> None:
-    """Checks the parts of a goal that all grasps need; raises PlanningError."""
+    """Checks the goal fields shared by all grasps; raises PlanningError."""
     scene.find_object(goal.target_name)
     check_objects(scene, goal)
     if not goal.possible_grasps:
