@@ -199,7 +199,7 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
     asked = request(model)
     PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(asked)
     problem = planner.asked[0]
-    way = OmplPlanner.repaired(problem, np.array([START, GOAL, START]))
+    way = OmplPlanner().repaired(problem, np.array([START, GOAL, START]))
     checker = ExactCollisionChecker(asked.scene, problem.group.indices)
     assert checker.path_is_free(problem.motion.full_path(way), problem.settings.finest_step)
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
