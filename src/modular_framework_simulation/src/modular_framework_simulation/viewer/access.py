@@ -48,8 +48,11 @@ class Access:
         return ""
 
     @contextlib.contextmanager
-    def enforced(self) -> Iterator[None]:
+    def enforced(self, **changed: Any) -> Iterator[None]:
         """Makes the server that viser starts in this context check its requests, because viser has no such option.
+
+        Args:
+            **changed: Further arguments of `websockets.asyncio.server.serve` that viser does not set.
 
         Raises:
             SimulationError: The version of viser is not supported, so its server is unchecked.
@@ -60,7 +63,8 @@ class Access:
 
         def serve(*args: Any, process_request: Any, **options: Any) -> Any:
             started.append(True)
-            return original(*args, process_request=functools.partial(self._process, process_request), **options)
+            process = functools.partial(self._process, process_request)
+            return original(*args, process_request=process, **{**options, **changed})
 
         server.serve = serve  # type: ignore[assignment, misc]
         try:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.viewer.access import Access
+from modular_framework_simulation.viewer.page_connections import PageConnections
 
 _TITLE = "Modular Benchmarking Framework"
 _MAX_PORTS = 100
@@ -58,8 +59,9 @@ class WebServer:
     def __init__(self, host: str, port: int) -> None:
         import viser  # takes a second to import
 
-        self._access = Access()
-        with contextlib.redirect_stdout(io.StringIO()), self._access.enforced():  # without viser's banner
+        self._access, self._connections = Access(), PageConnections()
+        hooks = self._access.enforced(create_connection=self._connections.kind)
+        with contextlib.redirect_stdout(io.StringIO()), hooks:  # without viser's banner
             self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
         self.host, self.port = host, int(self.viser.get_port())
         self.viser.gui.configure_theme(
@@ -81,7 +83,7 @@ class WebServer:
     @property
     def has_clients(self) -> bool:
         """Returns whether a browser is connected."""
-        return bool(self.viser.get_clients())
+        return self._connections.has_browser
 
     def show_grid(self, visible: bool) -> None:
         """Shows or hides the grid at z = 0 with a spacing of 0.1 m."""
@@ -108,5 +110,6 @@ class WebServer:
             camera.look_at = centre
 
     def close(self) -> None:
-        """Stops the server."""
+        """Stops the server, whatever the browsers do."""
+        self._connections.close(self.viser.get_event_loop())
         self.viser.stop()
