@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
+import os
 import re
+import signal
 import socket
 import threading
 import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import msgspec
 import numpy as np
@@ -29,9 +34,12 @@ from shape_msgs.msg import SolidPrimitive
 from simulation_time_msgs.srv import AdvanceTime
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from modular_framework_simulation.models.poses import Pose as SdfPose
+from modular_framework_simulation.models.sdf_specs import Box, Visual
+from modular_framework_simulation.sensors import scene_text
 from modular_framework_testing.ros_session import free_port, until
 
 URDF = """<robot name="arm"><link name="world"/>
@@ -48,6 +56,8 @@ LAUNCH = """<launch>
     <arg name="viewer_port" value="{port}"/>
   </include>
 </launch>"""
+WORLD = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">
+  <arg name="gui" value="false"/></include></launch>"""
 READ_ONLY = """<launch><group ns="watching"><include file="$(find modular_framework_simulation)/launch/viewer.launch">
   <arg name="port" value="{port}"/><arg name="read_only" value="true"/></include></group></launch>"""
 BOX = """<sdf version="1.6"><model name="box"><static>true</static><link name="link"><visual name="v"><geometry><box>
@@ -74,11 +84,14 @@ def address_in(log: str) -> str:
 class Browser:
     """What a browser knows of the page: the nodes of its scene with their poses, and the controls of its panel."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, renders: bool = True) -> None:
+        """Opens the page; with `renders=False` as a browser whose graphics have not drawn their first frame."""
         self._socket = connect(websocket(address), subprotocols=[PROTOCOL], max_size=None, compression=None)
         self.nodes: dict[str, dict[str, Any]] = {}
         self.controls: dict[str, dict[str, Any]] = {}
         threading.Thread(target=self._read, daemon=True).start()
+        if not renders:
+            return
         camera = {"wxyz": (1.0, 0, 0, 0), "position": (1.0, 1, 1), "look_at": (0.0, 0, 0), "up_direction": (0.0, 0, 1)}
         self._send("ViewerCameraMessage", **camera, fov=1.0, near=0.01, far=99.0, image_height=600, image_width=800)
 
@@ -86,11 +99,12 @@ class Browser:
         self._socket.send(msgspec.msgpack.encode({"type": kind, **values}))
 
     def _read(self) -> None:
-        for data in self._socket:
-            assert isinstance(data, bytes)
-            packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]
-            for message in msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(packed))["messages"]:
-                self._take(message)
+        with contextlib.suppress(ConnectionClosed):  # the viewer ends without waiting for browsers
+            for data in self._socket:
+                assert isinstance(data, bytes)
+                packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]
+                for message in msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(packed))["messages"]:
+                    self._take(message)
 
     def _take(self, message: dict[str, Any]) -> None:
         name, uuid = message.get("name"), message.get("uuid")
@@ -416,6 +430,92 @@ def trajectory_without_numbers() -> RobotTrajectory:
     return part
 
 
+def test_a_browser_that_has_not_drawn_a_frame_gets_panel_and_scene(box: Browser, launch: Any) -> None:
+    box.close()  # the only other browser
+    until(lambda: "/gazebo/visible_poses" not in subscribed_topics(), "no browser")
+    browser = Browser(address_in(launch.log()), renders=False)
+    until(lambda: "real time factor" in browser.text(), "the time is shown")
+    move("box", (0.2, 0.3, 0.4))
+    browser.follows("/world/box/link", (0.2, 0.3, 0.4))
+    browser.close()
+
+
+def test_a_reloaded_page_and_a_second_browser_show_the_present(launch: Any) -> None:
+    spawn("seen", BOX, (1.0, 1.0, 1.0))
+    first, second = Browser(address_in(launch.log())), Browser(address_in(launch.log()))
+    for browser in (first, second):
+        browser.follows("/world/seen/link", (1.0, 1.0, 1.0))
+    first.close()
+    move("seen", (2.0, 2.0, 2.0))
+    second.follows("/world/seen/link", (2.0, 2.0, 2.0))
+    reloaded = Browser(address_in(launch.log()))
+    reloaded.follows("/world/seen/link", (2.0, 2.0, 2.0))
+    assert call("/gazebo/delete_model", DeleteModel, "seen").success
+    for browser in (second, reloaded):
+        until(lambda browser=browser: "/world/seen/link" not in browser.nodes, "it is gone")  # type: ignore[misc]
+        browser.close()
+
+
 def test_without_a_page_nothing_is_subscribed_to(page: Browser) -> None:
     page.close()
     until(lambda: not {name for name in subscribed_topics() if "gazebo" in name or "joint" in name}, "it rests")
+
+
+def pid_of(node: str) -> int:
+    return int(ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2])
+
+
+@pytest.fixture
+def viewer(ros_session: Any) -> Iterator[tuple[str, psutil.Process]]:
+    """Starts one more viewer; yields its address and process."""
+    launch = ros_session.launch(READ_ONLY.format(port=free_port()))
+    until(lambda: "/ in a browser" in launch.log(), "the address in the log")
+    yield address_in(launch.log()), psutil.Process(pid_of("/watching/viewer"))
+    launch.stop()
+
+
+def test_a_slow_file_neither_freezes_the_status_nor_keeps_the_viewer_alive(
+    viewer: tuple[str, psutil.Process], tmp_path: Path
+) -> None:
+    texture = tmp_path / "slow.png"
+    os.mkfifo(texture)  # stands for a slow disk: whoever reads it waits
+    seen = Visual("v", SdfPose(), Box((1.0, 1.0, 1.0)), (1.0, 1.0, 1.0, 1.0), texture)
+    model = scene_text.VisibleModel(999, "slow", (scene_text.VisibleLink("link", (seen,)),))
+    address, process = viewer
+    browser = Browser(address)
+    until(lambda: "real time factor" in browser.text(), "the time is shown")
+    publisher = published("/gazebo/visible_models", String)
+
+    def is_loading() -> bool:
+        publisher.publish(String(scene_text.models_to_text([model])))  # the newest message counts
+        return "Loading the world." in browser.text()
+
+    until(is_loading, "the activity is named")
+    before = browser.text()
+    until(lambda: "Loading the world." in browser.text() != before, "time goes on")
+    publisher.unregister()
+    process.send_signal(signal.SIGINT)
+    process.wait(30.0)
+
+
+def test_a_killed_simulation_is_named_and_its_successor_is_shown(
+    launch: Any, ros_session: Any, viewer: tuple[str, psutil.Process]
+) -> None:
+    browser = Browser(viewer[0])
+    until(lambda: "real time factor" in browser.text(), "the time is shown")
+    spawn("first", BOX, (1.0, 0.0, 0.5))
+    until(lambda: "/world/first/link" in browser.nodes, "its model")
+    process = psutil.Process(pid_of("/gazebo"))
+    process.suspend()
+    until(lambda: "has not responded for" in browser.text(), "the silence is named")
+    process.resume()
+    until(lambda: "real time factor" in browser.text(), "the time is shown again")
+    process.kill()
+    until(lambda: "has not responded for" in browser.text(), "the end is named")
+    launch.stop()
+    ros_session.launch(WORLD)
+    until(lambda: "real time factor" in browser.text(), "its successor is named", 60.0)
+    spawn("successor", BALL, (0.0, 0.0, 2.0))
+    until(lambda: "/world/successor/link" in browser.nodes, "the model of the successor")
+    until(lambda: "/world/first/link" not in browser.nodes, "the model of the killed simulation is gone")
+    browser.close()

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from modular_framework_simulation.viewer.simulation_status import Phase, Status
 
 NO_CAMERA = "none"
 AS_FAST_AS_POSSIBLE = "as fast as possible"
@@ -45,27 +46,6 @@ class Commands(Protocol):
         """Returns the maximum ratio of simulated to real time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Status:
-    """Status of simulated time.
-
-    Attributes:
-        time_s: Simulated time [s]; None without a simulation.
-        paused: Whether time is paused.
-        factor: Measured ratio of simulated to real time.
-    """
-
-    time_s: float | None
-    paused: bool
-    factor: float
-
-    def __str__(self) -> str:
-        if self.time_s is None:
-            return "No simulation is running."
-        state = "paused" if self.paused else f"real time factor {self.factor:.2f}"
-        return f"Time {self.time_s:.2f} s, {state}"
-
-
 class ControlPanel:
     """Buttons, check boxes and camera image, whose state is read by the drawing thread.
 
@@ -79,7 +59,7 @@ class ControlPanel:
     def __init__(self, server: Any, commands: Commands, log: Callable[[str], None], *, read_only: bool = False) -> None:
         self._server, self._commands, self._log, self._read_only = server, commands, log, read_only
         gui = server.gui
-        self._status = gui.add_markdown(str(Status(None, False, 0.0)))
+        self._status = gui.add_markdown(str(Status(phase=Phase.SEARCHING)))
         self._shown_status = ""
         self._time = gui.add_folder("Time")
         with self._time:
@@ -144,14 +124,20 @@ class ControlPanel:
         self._speed.options = _speeds(factor)
         self._speed.value = self._known_speed
 
-    def show_status(self, status: Status) -> None:
-        """Shows the status of simulated time."""
-        if str(status) == self._shown_status:
+    def show_status(self, status: Status, activity: str = "") -> None:
+        """Shows the status of the simulation.
+
+        Args:
+            status: Status of the simulation.
+            activity: Activity of the viewer; empty for none.
+        """
+        text = f"{status} {activity}".rstrip()
+        if text == self._shown_status:
             return
-        self._shown_status = str(status)
-        self._status.content = str(status)
+        self._shown_status = text
+        self._status.content = text
         for handle, visible in (
-            (self._time, status.time_s is not None and not self._read_only),
+            (self._time, status.has_controls and not self._read_only),
             (self._paused, not status.paused),
             (self._resumed, status.paused),
         ):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import rospy
@@ -22,11 +23,15 @@ class Feed:
         topic: Name of the topic.
         kind: Message type of the topic.
         keep: Maximum number of queued messages; the oldest messages are dropped.
+        on_message: Function that gets each message instead of the queue, in the thread of its connection.
     """
 
-    def __init__(self, topic: str, kind: Any, keep: int = 1) -> None:
+    def __init__(
+        self, topic: str, kind: Any, keep: int = 1, *, on_message: Callable[[Any], None] | None = None
+    ) -> None:
         self._topic, self._kind, self._keep = topic, kind, keep
         self._queue: deque[Any] = deque(maxlen=keep)
+        self._on_message = on_message or self._queue.append
         self._subscriber: Any = None
 
     @property
@@ -38,7 +43,7 @@ class Feed:
         """Subscribes or unsubscribes; does nothing without a change."""
         if on and self._subscriber is None:
             self._subscriber = rospy.Subscriber(
-                self._topic, self._kind, self._queue.append, queue_size=self._keep, buff_size=_BUFFER_BYTES
+                self._topic, self._kind, self._on_message, queue_size=self._keep, buff_size=_BUFFER_BYTES
             )
         elif not on and self._subscriber is not None:
             self._subscriber.unregister()

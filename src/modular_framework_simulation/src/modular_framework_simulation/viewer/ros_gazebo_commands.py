@@ -15,7 +15,7 @@ from gazebo_msgs.srv import (
 from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeRequest
 from std_srvs.srv import Empty, EmptyRequest
 
-from modular_framework_ros.calls import CallError, request_service
+from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.viewer.control_panel import CommandError
 
@@ -73,7 +73,7 @@ class GazeboCommands:
 
 
 def _call(name: str, kind: Any, request: Any, timeout_s: float = _TIMEOUT_S) -> Any:
-    """Calls a service.
+    """Calls a service; the end of the node ends the call.
 
     Args:
         name: Name of the service.
@@ -85,6 +85,8 @@ def _call(name: str, kind: Any, request: Any, timeout_s: float = _TIMEOUT_S) -> 
         CommandError: The simulation is not running or did not respond.
     """
     try:
-        return request_service(name, kind, request, timeout_s)
+        proxy = rospy.ServiceProxy(name, kind)
+        wait_for_service(proxy, timeout_s)
+        return call_service(proxy, request, timeout_s, rospy.is_shutdown)
     except CallError as error:
         raise CommandError(str(error)) from None

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import rosgraph
 import rospkg
 import rospy
 from moveit_msgs.msg import DisplayTrajectory, PlanningScene
@@ -21,8 +23,8 @@ from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.parameter_search import nearest_parameter
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
-from modular_framework_simulation.sensors.scene_text import models_from_text, poses_from_text
-from modular_framework_simulation.viewer.control_panel import ControlPanel, Status
+from modular_framework_simulation.sensors.scene_text import ScenePoses, models_from_text, poses_from_text
+from modular_framework_simulation.viewer.control_panel import ControlPanel
 from modular_framework_simulation.viewer.layers import Layer
 from modular_framework_simulation.viewer.pictures import picture_of
 from modular_framework_simulation.viewer.plan_playback import plan_of
@@ -31,18 +33,23 @@ from modular_framework_simulation.viewer.robot_links import finite_positions
 from modular_framework_simulation.viewer.robot_view import PlanView, RobotView
 from modular_framework_simulation.viewer.ros_feed import BasePose, Feed
 from modular_framework_simulation.viewer.ros_gazebo_commands import GazeboCommands
+from modular_framework_simulation.viewer.ros_status_line import StatusLine
+from modular_framework_simulation.viewer.simulation_status import Phase, SimulationWatch
 from modular_framework_simulation.viewer.web_server import WebServer, free_port
-from modular_framework_simulation.viewer.world_view import RealTimeFactor, WorldView
+from modular_framework_simulation.viewer.world_view import WorldView
 
 _NODE = "viewer"
 _NICENESS = 5
-"""Lower priority than physics and controllers on a busy CPU."""
+"""Lower priority of the drawing thread than of physics and controllers on a busy CPU."""
 _RATE_HZ = 25.0
 _IDLE_PERIOD_S = 0.2
 """Maximum delay until the scene is drawn for a new client [s]."""
 _SEARCH_PERIOD_S = 2.0
+_SEARCH_DELAY_S = 0.5
+"""Delay of the first search, so that the world, which is small, is drawn before the meshes of a robot are read [s]."""
+_MAX_PAUSE_S = 0.2
+"""Maximum pause after a late frame [s]. viser sends nothing while a frame is drawn, so its server needs the pause."""
 _IMAGE_PERIOD_S = 0.2
-_STATUS_PERIOD_S = 0.25
 _SCENE_MESSAGES = 1000
 
 
@@ -75,58 +82,84 @@ class ViewerNode:
         self._description = ""
         self._base = BasePose(fixed_frame)
         self._models = Feed(ros_names.VISIBLE_MODELS, String)
-        self._poses = Feed(ros_names.VISIBLE_POSES, String)
+        self._poses = Feed(ros_names.VISIBLE_POSES, String, on_message=self._hear_poses)
         self._joints = Feed("joint_states", JointState, keep=20)
         self._scenes = Feed(ros_names.MONITORED_PLANNING_SCENE, PlanningScene, keep=_SCENE_MESSAGES)
         self._paths = Feed(ros_names.DISPLAY_PLANNED_PATH, DisplayTrajectory)
         self._images: Feed | None = None
-        self._factor = RealTimeFactor()
-        self._status = Status(None, False, 0.0)
+        self._watch = SimulationWatch()
+        self._status = StatusLine(self._panel, self._watch, lambda: server.has_clients, self._guard)
+        self._new_poses: ScenePoses | None = None
+        self._time_ns = 0
         self._replay_from_s: float | None = None
         self._scrub_position: float | None = None
         self._due_s: dict[str, float] = {}
         self._faults: dict[str, str] = {}
         self._had_clients = False
+        self._is_layer_chosen = False
+        self._ended = threading.Event()
         self._panel.on_replay(self._start_replay)
         self._panel.on_position(self._scrub)
 
     def run(self) -> None:
-        """Draws the scene until ROS shuts down."""
+        """Draws the scene until ROS shuts down.
+
+        Drawing has its own thread that the end of the process interrupts: a large mesh takes seconds on a busy CPU.
+        """
+        rospy.on_shutdown(self._ended.set)
+        for work in (self._draw_always, self._status.run):
+            threading.Thread(target=work, daemon=True).start()
+        self._ended.wait()
+
+    def _draw_always(self) -> None:
+        os.nice(_NICENESS)  # of this thread
+        with self._activity("Starting to draw."):
+            import trimesh.exchange.gltf  # noqa: F401  (takes a second, so not after a browser has connected)
         while not rospy.is_shutdown():
             start_s = time.monotonic()
             has_clients = self._server.has_clients
             self._guard("drawing", self._draw if has_clients else self._unsubscribe)
             self._had_clients = has_clients
             period_s = 1 / _RATE_HZ if has_clients else _IDLE_PERIOD_S
-            time.sleep(max(0.0, start_s + period_s - time.monotonic()))
+            drawn_s = time.monotonic() - start_s
+            time.sleep(max(min(drawn_s, _MAX_PAUSE_S), period_s - drawn_s))
+
+    @contextlib.contextmanager
+    def _activity(self, text: str) -> Iterator[None]:
+        """Adds an activity to the status line."""
+        self._status.activity = text
+        try:
+            yield
+        finally:
+            self._status.activity = ""
 
     def _unsubscribe(self) -> None:
         for feed in (self._models, self._poses, self._joints, self._scenes, self._paths, self._images):
             if feed is not None:
                 feed.switch(False)
         self._base.close()
+        self._is_layer_chosen = False
 
     def _draw(self) -> None:
         if not self._had_clients:
-            self._due_s.clear()
+            self._due_s = {"search": time.monotonic() + _SEARCH_DELAY_S}
         for feed in (self._models, self._poses, self._joints):
             feed.switch(True)
         self._paths.switch(self._panel.shows("plan"))
-        if self._is_due("look around", _SEARCH_PERIOD_S):
-            self._guard("looking for simulation and robot", self._search)
+        self._follow_simulation()
         for name, layer in self._layers.items():
             layer.visible = self._panel.shows(name)
         self._server.show_grid(self._panel.shows("grid"))
         self._server.show_shadows(self._panel.shows("shadows"))
-        self._take(self._models, lambda message: self._world.show(models_from_text(message.data)))
+        self._take(self._models, self._show_world)
         with self._server.viser.atomic():
-            self._take(self._poses, self._place_world)
+            self._place_world()
             self._draw_robot()
             self._draw_scene()
             self._draw_plan()
         self._draw_image()
-        if self._is_due("status", _STATUS_PERIOD_S):
-            self._panel.show_status(self._status)
+        if self._is_due("search", _SEARCH_PERIOD_S):
+            self._guard("looking for robot and cameras", self._search)
 
     def _take(self, feed: Feed, work: Callable[[Any], None]) -> None:
         for message in feed.take():
@@ -137,6 +170,8 @@ class ViewerNode:
         try:
             work()
         except Exception as error:  # any node may publish invalid messages
+            if self._ended.is_set():
+                return  # the server is closing
             known = isinstance(error, SimulationError | ValueError)
             fault = str(error) if known else f"unexpected {type(error).__name__}: {error}"
             if self._faults.get(name) != fault:
@@ -150,32 +185,51 @@ class ViewerNode:
         self._due_s[name] = now_s + period_s
         return True
 
-    def _search(self) -> None:
-        """Searches for a simulation, a robot and cameras."""
-        has_simulation = _has_service(ros_names.PAUSE_PHYSICS)
-        if has_simulation != (self._status.time_s is not None):
-            self._status = Status(0.0 if has_simulation else None, False, 0.0)
-            if has_simulation:
-                self._panel.refresh_speed()
-        if not has_simulation:
+    def _follow_simulation(self) -> None:
+        """Clears the world after the end of a simulation, and chooses the layer that a robot without simulation has."""
+        phase = self._watch.status(time.monotonic()).phase
+        is_absent = phase is Phase.ABSENT
+        if is_absent and not self._world.is_empty:
             self._world.show(())
-        if not has_simulation and not self._had_clients:
-            self._panel.show_planning_scene()
+            self._models.switch(False)  # the next subscription receives the latched models again
+        if not self._is_layer_chosen and phase in (Phase.ABSENT, Phase.WAITING, Phase.RUNNING):
+            self._is_layer_chosen = True
+            if is_absent:
+                self._panel.show_planning_scene()
+
+    def _search(self) -> None:
+        """Searches for a robot and cameras."""
         images = [name for name, kind in rospy.get_published_topics() if kind == Image._type]
         self._panel.offer_cameras(images)
         text = rospy.get_param(nearest_parameter("robot_description"), "")
         if isinstance(text, str) and text and text != self._description:
             self._description = text
             find_package = rospkg.RosPack().get_path
-            self._robot = RobotView(self._layers["robot"], text, find_package, rospy.logwarn)
+            with self._activity("Loading the robot."):
+                self._robot = RobotView(self._layers["robot"], text, find_package, rospy.logwarn)
             self._plan.show(None, self._robot)
             self._server.look_at(np.array([pose.position for pose in self._robot.in_world.values()]))
 
-    def _place_world(self, message: Any) -> None:
-        poses = poses_from_text(message.data)
+    def _hear_poses(self, message: Any) -> None:
+        def note() -> None:
+            poses = poses_from_text(message.data)
+            self._watch.note_poses(poses, time.monotonic())
+            self._new_poses = poses
+
+        self._guard(self._poses.topic, note)
+
+    def _show_world(self, message: Any) -> None:
+        with self._activity("Loading the world."):
+            self._world.show(models_from_text(message.data))
+
+    def _place_world(self) -> None:
+        poses, self._new_poses = self._new_poses, None
+        if poses is None:
+            return
+        if poses.time_ns < self._time_ns:
+            self._base.close()  # its buffer rejects transforms that are older than its latest
+        self._time_ns = poses.time_ns
         self._world.place(poses)
-        self._factor.note(time.monotonic(), poses.time_ns)
-        self._status = Status(poses.time_ns * 1e-9, poses.paused, self._factor.value)
 
     def _draw_robot(self) -> None:
         robot = self._robot
@@ -245,14 +299,6 @@ def _positions_of(message: Any) -> dict[str, float]:
     return finite_positions(message.name, message.position) if message.position else {}
 
 
-def _has_service(name: str) -> bool:
-    try:
-        rosgraph.Master(rospy.get_name()).lookupService(name)
-    except (rosgraph.MasterException, OSError):
-        return False
-    return True
-
-
 def main() -> int:
     """Runs the node.
 
@@ -261,7 +307,6 @@ def main() -> int:
     """
     # Without simulated time, the viewer continues while time is paused.
     rospy.init_node(_NODE, disable_rostime=True)
-    os.nice(_NICENESS)
     read = DeclaredParameters("modular_framework_simulation", "viewer").values
     try:
         host, port, frame, read_only = read("~address", "~port", "~fixed_frame", "~read_only")
@@ -274,4 +319,5 @@ def main() -> int:
     rospy.loginfo("viewer: open %s in a browser", server.address)
     ViewerNode(server, frame, read_only).run()
     server.close()
-    return 0
+    logging.shutdown()
+    os._exit(0)  # the interpreter would wait for a thread that loads a mesh, which takes seconds on a busy CPU

@@ -24,16 +24,26 @@ class WorldView:
 
     def __init__(self, layer: Layer, log: Callable[[str], None]) -> None:
         self._layer, self._log = layer, log
+        self._models: dict[int, VisibleModel] = {}
         self._paths: dict[int, tuple[str, ...]] = {}
 
+    @property
+    def is_empty(self) -> bool:
+        """Returns whether no model is shown."""
+        return not self._models
+
     def show(self, models: Sequence[VisibleModel]) -> None:
-        """Shows exactly these models; models that are already shown are not changed."""
+        """Shows exactly these models; models that are already shown are not changed.
+
+        A restarted simulation gives the numbers of earlier models to other models.
+        """
         shown = {model.number: model for model in models}
-        for number in [number for number in self._paths if number not in shown]:
+        for number in [number for number, model in self._models.items() if shown.get(number) != model]:
+            del self._models[number]
             for path in self._paths.pop(number):
                 self._layer.remove(path)
         for number, model in shown.items():
-            if number in self._paths:
+            if number in self._models:
                 continue
             paths = []
             for link in model.links:
@@ -45,7 +55,7 @@ class WorldView:
                     look=Look.GROUND if is_ground else Look.SOLID,
                 )
                 paths.append(path)
-            self._paths[number] = tuple(paths)
+            self._models[number], self._paths[number] = model, tuple(paths)
 
     def place(self, poses: ScenePoses) -> None:
         """Moves the models to their poses; models that are not shown are ignored."""
