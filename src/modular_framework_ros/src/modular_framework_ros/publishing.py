@@ -54,6 +54,7 @@ class PicturePublisher(rospy.SubscribeListener):
         """
         with self._lock:
             if self._publisher.get_num_connections() > 0:
+                self._draw = None  # rospy may report the first subscriber only after this message
                 publish(self._publisher, draw())
             else:
                 self._draw = draw
