@@ -95,16 +95,12 @@ class HalfWayController(Controller):
     def update(self, time_s, period_s):
         self._joint.command += 0.5 * (self._goal - self._joint.command)
 """
-LOOP = f"""
-import sys
-
-sys.path.insert(0, {str(ROOT / "tests/unit/modular_framework_control")!r})
-from conftest import Loop
-
+LOOP = """
 from modular_framework_control.hardware_interface.interfaces import JointStateInterface
+from modular_framework_testing.control.stepped_loop import SteppedLoop
 
-half = {{"type": "modular_framework_control/HalfWayController", "joint": "a", "goal": 0.8}}
-loop = Loop({{"hw": {{"joints": ["a"]}}, "half": half, "misspelt": {{**half, "gaol": 0.5}}}})
+half = {"type": "modular_framework_control/HalfWayController", "joint": "a", "goal": 0.8}
+loop = SteppedLoop({"hw": {"joints": ["a"]}, "half": half, "misspelt": {**half, "gaol": 0.5}})
 loop.manager.load_controller("half")
 loop.manager.load_controller("misspelt")
 loop.step()

@@ -443,11 +443,11 @@ def test_a_controller_whose_topics_cannot_be_opened_is_closed_and_not_loaded(mak
     known = types()
     known.register("test/Recorder", Opened)
     loop = make_loop(PARAMETERS, types=known)
-    loop.fault_of_topics = OSError("no such topic")
+    loop.topics_error = OSError("no such topic")
     with pytest.raises(ControllerError, match="cannot load controller 'left': .* raised OSError: no such topic"):
         loop.manager.load_controller("left")
     assert closed == [True] and loop.states() == {}
-    loop.fault_of_topics = None
+    loop.topics_error = None
     loop.spawn("left")
 
 

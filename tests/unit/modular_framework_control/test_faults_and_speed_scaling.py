@@ -13,8 +13,6 @@ import pytest
 from modular_framework_control.controller_interface.controller import ControllerError
 from modular_framework_control.controllers.gripper_action_controller import GripperGoalHandle
 from modular_framework_control.hardware_interface.handles import SpeedScalingHandle
-from modular_framework_control.hardware_interface.interfaces import COMMAND_INTERFACES, SpeedScalingInterface
-from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
 from modular_framework_control.trajectory.trajectory_clock import RATE_RISE_PER_S, TrajectoryClock
@@ -23,7 +21,7 @@ from modular_framework_control.trajectory.trajectory_goal import (
     TrajectoryGoal,
     TrajectoryGoalHandle,
 )
-from modular_framework_ros.node_handle import NodeHandle
+from modular_framework_testing.control.movable_robot_hw import MovableRobotHW
 
 FAMILIES = {
     "position": "PositionJointInterface",
@@ -34,36 +32,6 @@ FAMILIES = {
 }
 GAINS = {"velocity": {"p": 20.0}, "effort": {"p": 100.0, "d": 20.0}}
 ZEROS = (0.0, 0.0)
-
-
-class FaultyRobotHW(MockRobotHW):
-    """Fake hardware that can be slowed down, paused, stopped by a fault, and moved by hand."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reason = ""
-        self.by_hand: list[float] | None = None
-        self.scaling = SpeedScalingHandle("speed_scaling_factor", ["a", "b"])
-
-    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
-        scalings = SpeedScalingInterface()
-        scalings.register_handle(self.scaling)
-        self.register_interface(scalings)
-        return super().init(root_nh, robot_hw_nh)
-
-    @property
-    def joints(self) -> list[Any]:
-        """The command handles."""
-        return next(interface.handles for interface in map(self.find, COMMAND_INTERFACES) if interface is not None)
-
-    def fault(self) -> str:
-        return self.reason
-
-    def read(self, time_s: float, period_s: float) -> None:
-        if not self.reason:
-            super().read(time_s, period_s)
-        for joint, position in zip(self.joints, self.by_hand or (), strict=False):
-            joint.state.position, joint.state.velocity = position, 0.0
 
 
 @pytest.fixture
@@ -79,7 +47,7 @@ def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
                     **more,
                 },
             },
-            FaultyRobotHW(),
+            MovableRobotHW(),
         )
         loop.spawn("c")
         return loop
