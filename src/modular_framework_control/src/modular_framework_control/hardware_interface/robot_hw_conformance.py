@@ -49,6 +49,13 @@ MIN_DURATION_FRACTION = 0.7
 """Minimum duration of a jump as a fraction of its duration at the velocity limit."""
 
 
+def _duration_s(call: Callable[..., Any], *arguments: Any) -> float:
+    """Returns the duration of a call, without the switch to the thread of the loop [s]."""
+    start_s = time.perf_counter()
+    call(*arguments)
+    return time.perf_counter() - start_s
+
+
 class RobotHWConformance(ABC):
     """Tests of one hardware.
 
@@ -250,9 +257,7 @@ class RobotHWConformance(ABC):
         durations_s: dict[str, list[float]] = {"read": [], "write": []}
         for _ in range(TIMED_CYCLES):
             for name, durations in durations_s.items():
-                start_s = time.perf_counter()
-                self._in_loop(getattr(robot_hw, name), self._time_s, self.period_s)
-                durations.append(time.perf_counter() - start_s)
+                durations.append(self._in_loop(_duration_s, getattr(robot_hw, name), self._time_s, self.period_s))
                 if name == "read":
                     self._in_loop(robot_hw.seed_commands)
             self._time_s += self.period_s
