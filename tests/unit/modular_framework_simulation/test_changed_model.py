@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model with another mass or friction moves accordingly in each engine, also in another size."""
+"""A model with another mass, centre of mass or friction moves accordingly in each engine, also in another size."""
 
 from __future__ import annotations
 
@@ -32,6 +32,14 @@ def engine(request: pytest.FixtureRequest) -> str:
     return name
 
 
+BLOCK = read_model_text(
+    "<sdf version='1.6'><model name='block'><static>true</static><link name='link'><collision name='c'><geometry><box>"
+    "<size>0.2 0.2 0.1</size></box></geometry></collision></link></model></sdf>",
+    "block",
+    Resources((), no_packages),
+)
+
+
 def changed_cube(scale: float = 1.0, **factors: float) -> Model:
     """The shipped cube in another size with a change, on the floor."""
     text = scaled_model((MODELS / "cube" / "model.sdf").read_text(), scale, "cube")
@@ -54,6 +62,18 @@ def test_a_sliding_cube_slows_down_with_the_changed_friction(world: PhysicsWorld
     run(world, 0.3)
     expected = 1.0 - 0.25 * CUBE_FRICTION * GRAVITY * 0.3
     assert body.state().twist.linear[0] == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize(("offset_m", "falls"), [(0.0, False), (0.015, False), (0.024, True)])
+def test_a_cube_tips_over_an_edge_that_its_centre_of_mass_has_passed(
+    world: PhysicsWorld, offset_m: float, falls: bool
+) -> None:
+    """The cube extends 5 mm beyond the edge of a block, so that it tips from an offset of 20 mm on."""
+    world.spawn(dataclasses.replace(BLOCK, pose=Pose((-0.1, 0.0, 0.05))))
+    cube = changed_cube(centre_of_mass=offset_m)
+    body = world.spawn(dataclasses.replace(cube, pose=Pose((-0.02, 0.0, 0.125))))
+    run(world, 1.5)
+    assert (body.state().pose.position[2] < 0.1) == falls
 
 
 SDF = "<sdf version='1.11'><model name='m'><link name='link'>{}</link></model></sdf>"
@@ -106,9 +126,10 @@ def test_a_surface_that_never_slides_keeps_its_friction() -> None:
     [
         ("<sdf", "not an XML document"),
         ("<sdf version='1.6'><model name='m'><include><uri>model://can</uri></include></model></sdf>", "<include>"),
+        (SDF.format("<inertial auto='true'/>"), "allowed with another centre of mass: an <inertial> with mass"),
     ],
 )
 def test_a_model_that_cannot_be_changed_is_refused(text: str, reason: str) -> None:
     with pytest.raises(DescriptionError, match=reason):
-        changed_model(text, "model.sdf", mass=2.0)
+        changed_model(text, "model.sdf", centre_of_mass=0.01)
     assert changed_model(text, "model.sdf") == text

@@ -165,6 +165,12 @@ def _description(placed: PlacedObject) -> str:
     perturbed = placed.perturbed or ObjectPerturbation()
     try:
         text = read_scaled(path, placed.scale)
-        return changed_model(text, str(path), mass=perturbed.mass, friction=perturbed.friction)
+        return changed_model(
+            text,
+            str(path),
+            mass=perturbed.mass,
+            friction=perturbed.friction,
+            centre_of_mass=perturbed.centre_of_mass,
+        )
     except (OSError, DescriptionError) as error:
         raise WorldError(f"model '{placed.model}': {path} cannot be used: {error}; correct the name") from error

@@ -103,7 +103,12 @@ class SceneObject:
         if distance_m := values.perceived_pose_error:
             direction_rad = generator_of(*key, "pose_error").uniform(-math.pi, math.pi)
             error = (round(distance_m * math.cos(direction_rad), 9), round(distance_m * math.sin(direction_rad), 9))
-        found = ObjectPerturbation(mass=values.object_mass, friction=values.object_friction, pose_error=error)
+        found = ObjectPerturbation(
+            mass=values.object_mass,
+            friction=values.object_friction,
+            centre_of_mass=values.object_centre_of_mass,
+            pose_error=error,
+        )
         return None if found == ObjectPerturbation() else found
 
     def is_clear_of(self, placed: PlacedObject, others: Sequence[PlacedObject]) -> bool:
@@ -363,7 +368,13 @@ def _check_perturbation(objects: Sequence[SceneObject], location: SourceLocation
     first, values = objects[0], objects[0].perturbation
     is_scaled = values.object_size != 1.0
     text = read_scaled(first.file, values.object_size if is_scaled else None)
-    changed_model(text, str(first.file), mass=values.object_mass, friction=values.object_friction)
+    changed_model(
+        text,
+        str(first.file),
+        mass=values.object_mass,
+        friction=values.object_friction,
+        centre_of_mass=values.object_centre_of_mass,
+    )
     if not is_scaled:
         return
     if "z" in first.pose:

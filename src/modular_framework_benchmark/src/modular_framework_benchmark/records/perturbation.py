@@ -69,6 +69,15 @@ _AXES = (
         description="Factor of all lengths of the objects at constant density. The planning scene shows the true size.",
     ),
     PerturbationAxis(
+        name="object_centre_of_mass",
+        units=_LENGTH,
+        nominal=0.0,
+        low=0.0,
+        high=0.2,
+        description="Distance between the centre of mass of each object and its nominal place, along the object's x "
+        "axis.",
+    ),
+    PerturbationAxis(
         name="perceived_pose_error",
         units=_LENGTH,
         nominal=0.0,
@@ -89,6 +98,7 @@ class Perturbation:
     object_mass: float = 1.0
     object_friction: float = 1.0
     object_size: float = 1.0
+    object_centre_of_mass: float = 0.0
     perceived_pose_error: float = 0.0
 
 
@@ -99,11 +109,13 @@ class ObjectPerturbation:
     Attributes:
         mass: Factor of masses and moments of inertia.
         friction: Factor of the friction coefficients.
+        centre_of_mass: Distance by which the centre of mass moves along the object's x axis [m].
         pose_error: Perceived minus true position in the world frame, x and y [m].
     """
 
     mass: float = 1.0
     friction: float = 1.0
+    centre_of_mass: float = 0.0
     pose_error: tuple[float, ...] = (0.0, 0.0)
 
 

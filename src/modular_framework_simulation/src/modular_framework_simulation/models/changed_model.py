@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes the mass and the friction in the SDF description of a model."""
+"""Changes the mass, its centre and the friction in the SDF description of a model."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from modular_framework_urdf.xml_text import Element, add_child, to_text
 _COEFFICIENTS = ("ode/mu", "ode/mu2", "bullet/friction", "bullet/friction2")
 
 
-def changed_model(text: str, where: str, *, mass: float = 1.0, friction: float = 1.0) -> str:
-    """Returns the description of a model whose mass and friction are multiplied by factors.
+def changed_model(
+    text: str, where: str, *, mass: float = 1.0, friction: float = 1.0, centre_of_mass: float = 0.0
+) -> str:
+    """Returns the description of a model with another mass, friction or centre of mass.
 
     Args:
         text: SDF file of a model.
         where: Name of the file, for errors.
         mass: Positive factor of masses and moments of inertia.
         friction: Positive factor of the sliding friction coefficients; surfaces that never slide keep theirs.
+        centre_of_mass: Distance by which the centre of mass of each link moves along the x axis of the link [m].
 
     Raises:
-        DescriptionError: The text is not XML, or includes another model.
+        DescriptionError: The text is not XML, the model includes another model, or a link whose centre of mass should
+            move computes its mass from its shapes.
     """
-    if mass == friction == 1.0:
+    if mass == friction == 1.0 and centre_of_mass == 0.0:
         return text
     root = parsed_model(text, where)
     if root.find(".//include") is not None:
@@ -34,13 +38,16 @@ def changed_model(text: str, where: str, *, mass: float = 1.0, friction: float =
     if friction != 1.0:
         for collision in root.iter("collision"):
             _change_friction(collision, friction)
+    if centre_of_mass != 0.0:
+        for link in root.iter("link"):
+            _move_centre_of_mass(link, centre_of_mass, where)
     return to_text(root)
 
 
 def _change_mass(link: Element, factor: float) -> None:
     """Multiplies mass and moments of inertia of a link; missing values have SDF's defaults."""
     inertial = _child(link, "inertial")
-    if inertial.get("auto", "false").strip().lower() in ("true", "1"):
+    if _is_computed(inertial):
         for density in (_child(inertial, "density", WATER_KG_PER_M3), *link.findall("collision/density")):
             multiply_numbers(density, factor)
         return
@@ -48,6 +55,21 @@ def _change_mass(link: Element, factor: float) -> None:
     inertia = _child(inertial, "inertia")
     for name in MOMENTS:
         multiply_numbers(_child(inertia, name, 1.0 if name[1] == name[2] else 0.0), factor)
+
+
+def _is_computed(inertial: Element) -> bool:
+    """Returns whether the mass properties are computed from the shapes of the link."""
+    return inertial.get("auto", "false").strip().lower() in ("true", "1")
+
+
+def _move_centre_of_mass(link: Element, offset_m: float, where: str) -> None:
+    inertial = _child(link, "inertial")
+    if _is_computed(inertial):
+        allowed = "allowed with another centre of mass: an <inertial> with mass and inertia"
+        raise DescriptionError(where, "got <inertial auto='true'>", allowed)
+    pose = _child(inertial, "pose")
+    x, *others = (pose.text or "0 0 0 0 0 0").split()
+    pose.text = " ".join([repr(float(x) + offset_m), *others])
 
 
 def _change_friction(collision: Element, factor: float) -> None:
