@@ -64,12 +64,10 @@ def moved(pose: pin.SE3, shift: tuple[float, float, float], turn: tuple[float, f
 
 
 def lin(scene: PlanningScene, target: pin.SE3, **changes: object) -> PlanningRequest:
-    return dataclasses.replace(
-        PlanningRequest(
-            scene, GROUP, (PoseGoal(LINK, target),), planner_id="LIN", velocity_scaling=0.3, acceleration_scaling=0.3
-        ),
-        **changes,
-    )
+    """A line; a long arc on a busy machine takes longer than the default time."""
+    scaling = {"velocity_scaling": 0.3, "acceleration_scaling": 0.3}
+    request = PlanningRequest(scene, GROUP, (PoseGoal(LINK, target),), planner_id="LIN", allowed_time_s=60.0, **scaling)
+    return dataclasses.replace(request, **changes)
 
 
 def joint_goal(model: RobotModel, values: np.ndarray) -> JointGoal:
