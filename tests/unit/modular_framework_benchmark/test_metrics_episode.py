@@ -23,7 +23,7 @@ from modular_framework_benchmark.metrics.measurements import (
 from modular_framework_benchmark.metrics.registry import METRICS, MetricError, find_metric, load_metric, measure
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, OwnMetric
-from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, PLANNING_TIME, REACHABLE, declared
+from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, PLANNING_TIME, REACHABLE, declared_figure
 
 JOINTS = ("pan", "lift")
 TIMES = np.linspace(0.0, 4.0, 401)
@@ -35,7 +35,7 @@ def planned(succeeded: bool, planning_time_s: float, length: float = 1.0, **figu
         *("planning", "to_grasp", succeeded, "" if succeeded else "no path", 0.0, 0.0),
         wall_s=planning_time_s,
         figures={PLANNING_TIME: planning_time_s}
-        | {declared("planning", name): value for name, value in figures.items()},
+        | {declared_figure("planning", name): value for name, value in figures.items()},
         motion=motion if succeeded else None,
     )
 

@@ -16,7 +16,7 @@ from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.experiment import MetricKind
 from modular_framework_benchmark.reports.tables import metric_title
-from modular_framework_ros.reported_figures import CANDIDATES, FIGURES, Clock, Source, declared
+from modular_framework_ros.reported_figures import CANDIDATES, FIGURES, Clock, Source, declared_figure
 
 
 def recorded(component: str, figures: Mapping[str, float]) -> EpisodeMeasurements:
@@ -38,9 +38,9 @@ def test_a_declared_figure_of_a_recording_is_what_its_metric_measures() -> None:
 def test_a_figure_of_a_component_of_a_users_own_is_kept_under_its_name() -> None:
     episode = recorded("my_camera", {"points": 512.0, "candidates": 3.0})
 
-    assert episode.values_of(declared("my_camera", "points")) == [512.0]
+    assert episode.values_of(declared_figure("my_camera", "points")) == [512.0]
     assert episode.values_of(CANDIDATES) == []
-    assert declared("my_camera", "points").source is Source.SAID
+    assert declared_figure("my_camera", "points").source is Source.SAID
 
 
 @pytest.mark.parametrize("figure", FIGURES.values(), ids=lambda figure: figure.name)

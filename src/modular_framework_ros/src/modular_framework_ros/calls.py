@@ -189,18 +189,18 @@ def wait_for_result(
     """
     stopped, watched_from_s = False, time.monotonic() + WATCHED_AFTER_S
 
-    def ended() -> bool:
+    def has_ended() -> bool:
         # The goal status is final before the result has arrived; DONE means both. The goal handle has this state,
         # while the client misses an end that comes before send_goal() returns.
         return bool(client.gh is not None and client.gh.get_comm_state() == CommState.DONE)
 
-    def finished() -> bool:
+    def is_finished() -> bool:
         nonlocal stopped
         stopped = stopped or stop_requested()
-        return stopped or ended() or (time.monotonic() > watched_from_s and bool(frozen_nodes()))
+        return stopped or has_ended() or (time.monotonic() > watched_from_s and bool(frozen_nodes()))
 
-    if wait_until(finished, timeout_s) and not stopped and ended():
+    if wait_until(is_finished, timeout_s) and not stopped and has_ended():
         return int(client.get_state())
     client.cancel_goal()
-    wait_until(ended, CANCEL_WAIT_S)
+    wait_until(has_ended, CANCEL_WAIT_S)
     return int(GoalStatus.PREEMPTED if stopped else GoalStatus.LOST)

@@ -40,7 +40,7 @@ def tree_faults(
     if not parent:
         for name, item in below.parameters.items():
             if item.required and parameters.get(name) is None:
-                yield f"parameter '{name}' is not set; {item.needed}"
+                yield f"parameter '{name}' is not set; {item.requirement}"
 
 
 def tree_fault(name: str, value: Any, below: NodeDeclaration, robot: Mapping[str, Collection[str]]) -> str:

@@ -77,7 +77,7 @@ class Declaration:
     below: str = ""
 
     @property
-    def allowed(self) -> str:
+    def allowed_values(self) -> str:
         """Description of the allowed values."""
         if self.choices:
             return ", ".join(map(str, self.choices))
@@ -94,11 +94,11 @@ class Declaration:
         return ", ".join([words, " and ".join(bounds)] if bounds else [words])
 
     @property
-    def needed(self) -> str:
+    def requirement(self) -> str:
         """Allowed values and meaning, as text for messages."""
-        return f"allowed: {self.allowed} ({self.doc.rstrip('.')})"
+        return f"allowed: {self.allowed_values} ({self.doc.rstrip('.')})"
 
-    def resolved(self, get: Callable[[str], Any]) -> Declaration:
+    def apply_required_with(self, get: Callable[[str], Any]) -> Declaration:
         """Returns the declaration with `required_with` applied to the values of the other parameters.
 
         Args:
@@ -116,7 +116,7 @@ class Declaration:
         fits = fits and self._is_within(value) and not (self.required and value in ("", []))
         if fits and (not self.choices or value in self.choices):
             return ""
-        return f"is {value!r}; {self.needed}"
+        return f"is {value!r}; {self.requirement}"
 
     def _is_within(self, value: Any) -> bool:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -195,12 +195,12 @@ class ParameterReader:
         """
         found, faults = [], []
         for name in names:
-            declared = self._declared[name].resolved(self._get)
+            declared = self._declared[name].apply_required_with(self._get)
             declared = replace(declared, required=True) if name in required else declared
             value = self._get(declared.name)
             value = declared.default if value is None else value
             if value is None and declared.required:
-                faults.append(f"parameter '{self._whole_name(declared.name)}' is not set; {declared.needed}")
+                faults.append(f"parameter '{self._whole_name(declared.name)}' is not set; {declared.requirement}")
             elif value is not None and declared.fault(value):
                 faults.append(f"parameter '{self._whole_name(declared.name)}' {declared.fault(value)}")
             found.append(float(value) if declared.type == "float" and not faults and value is not None else value)

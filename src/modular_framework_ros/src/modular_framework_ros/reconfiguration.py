@@ -31,7 +31,7 @@ class Adjustable:
     description: str
 
     @property
-    def kind(self) -> str:
+    def type_name(self) -> str:
         """Type name of dynamic_reconfigure."""
         return {bool: "bool", int: "int", float: "double"}[type(self.lowest)]
 
@@ -109,7 +109,7 @@ class Reconfiguration:
         defaults = {item.name: getattr(settings, item.name) for item in self._table}
         for name, value in defaults.items():  # the server reads these parameters and does not check them
             rospy.set_param(f"{self._namespace}/{name}", value)
-        self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
+        self._server = _Server(described_parameters(self._table, defaults), self._adjust, self._namespace)
 
     def refresh(self) -> None:
         """Publishes the current settings after a change by other means; does nothing before `connect`."""
@@ -141,7 +141,7 @@ class Reconfiguration:
         return config
 
 
-def described(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> SimpleNamespace:
+def described_parameters(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> SimpleNamespace:
     """Returns the equivalent of the module that dynamic_reconfigure generates from a .cfg file.
 
     Ranges are extended to the configured values, so that starting the server changes nothing.
@@ -151,7 +151,7 @@ def described(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> Sim
     entries = [
         {
             "name": item.name,
-            "type": item.kind,
+            "type": item.type_name,
             "level": 1,
             "description": item.description,
             "default": defaults[item.name],

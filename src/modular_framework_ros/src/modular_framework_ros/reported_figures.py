@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Declares the figures that components of the framework report, for reporters and metrics.
 
-User-defined components may report further figures, for which `declared` returns a declaration without unit and clock.
+User-defined components may report further figures, for which `declared_figure` returns a declaration without unit
+and clock.
 """
 
 from __future__ import annotations
@@ -81,6 +82,6 @@ FIGURES = {(found.component, found.name): found for found in list(globals().valu
 """All declared figures by component and name."""
 
 
-def declared(component: str, name: str) -> Figure:
+def declared_figure(component: str, name: str) -> Figure:
     """Returns the declaration of a figure; for a user-defined figure a declaration without unit and clock."""
     return FIGURES.get((component, name)) or Figure(name, component)

@@ -32,7 +32,7 @@ from modular_framework_benchmark.metrics.measurements import (
 )
 from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.predicates.world_track import read_world
-from modular_framework_ros.reported_figures import declared
+from modular_framework_ros.reported_figures import declared_figure
 
 TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
 PARAMETERS, WORLD_RECORD = "parameters.json", "world.json"
@@ -76,7 +76,7 @@ def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:
                 key: entry[key]
                 for key in ("component", "name", "succeeded", "reason", "started_s", "ended_s", "wall_s")
             },
-            figures={declared(entry["component"], name): value for name, value in entry["figures"].items()},
+            figures={declared_figure(entry["component"], name): value for name, value in entry["figures"].items()},
             motion=_motion(entry["motion"]),
         )
         for entry in entries

@@ -171,7 +171,7 @@ class DeclaredNames:
             if name in ROSLAUNCH_NAMES or any(item.tree for _, item in users):
                 continue
             for node, declared in users:
-                item = declared.resolved(partial(self._parameter_value, node))
+                item = declared.apply_required_with(partial(self._parameter_value, node))
                 value = self._launch.parameters.get(name, item.default)
                 if value is None and item.required:
                     yield LaunchFault(name, f"node '{node.name}' needs the parameter '{name}'; {item.doc}")
