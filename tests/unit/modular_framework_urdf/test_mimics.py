@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import pytest
 
-from modular_framework_urdf.mimics import Mimic, resolved, with_leaders
+from modular_framework_urdf.mimics import Mimic, resolve_mimics, with_leaders
 
 
 def test_a_chain_of_mimic_joints_follows_its_first_one() -> None:
-    found = resolved({"c": Mimic("b", -2.0, 0.5), "b": Mimic("a", 3.0, 1.0)}, ["a", "b", "c"])
+    found = resolve_mimics({"c": Mimic("b", -2.0, 0.5), "b": Mimic("a", 3.0, 1.0)}, ["a", "b", "c"])
     assert found == {"b": Mimic("a", 3.0, 1.0), "c": Mimic("a", -6.0, -1.5)}
     assert pytest.approx(-6.0 * 0.2 - 1.5) == -2.0 * (3.0 * 0.2 + 1.0) + 0.5
 
@@ -31,7 +31,7 @@ def test_a_chain_of_mimic_joints_follows_its_first_one() -> None:
 )
 def test_what_follows_nothing_that_moves_is_refused(mimics: dict[str, Mimic], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        resolved(mimics, ["a", "b", "c"])
+        resolve_mimics(mimics, ["a", "b", "c"])
 
 
 def test_a_joint_that_mimics_stands_for_its_leader_unless_that_is_named() -> None:

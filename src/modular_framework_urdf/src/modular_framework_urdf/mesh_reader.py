@@ -83,7 +83,7 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", 
         raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; correct the file")
     if centred:
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    vertices, triangles = _merged(vertices * (unit * factors), triangles)
+    vertices, triangles = _merge_vertices(vertices * (unit * factors), triangles)
     if np.abs(vertices).max() > MAX_LENGTH_M:
         raise MeshError(
             path,
@@ -160,7 +160,7 @@ def _corners(corners: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
-def _merged(
+def _merge_vertices(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Merges vertices at the same position."""

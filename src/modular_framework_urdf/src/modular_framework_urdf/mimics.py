@@ -26,7 +26,7 @@ class Mimic:
         return first, last
 
 
-def resolved(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str, Mimic]:
+def resolve_mimics(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str, Mimic]:
     """Returns the relation of each mimic joint to an independent leading joint.
 
     Args:
@@ -75,7 +75,7 @@ def with_leaders(values: Mapping[str, float], mimics: Mapping[str, Mimic]) -> di
 
     Args:
         values: Positions by joint [rad or m].
-        mimics: Relations from `resolved`.
+        mimics: Relations from `resolve_mimics`.
     """
     result = {name: value for name, value in values.items() if name not in mimics}
     for name in values.keys() & mimics.keys():

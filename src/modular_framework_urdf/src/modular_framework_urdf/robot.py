@@ -198,7 +198,7 @@ class Joint(UrdfElement):
     mimic: Mimic | None
 
     @property
-    def movable(self) -> bool:
+    def is_movable(self) -> bool:
         """Whether the joint type is movable."""
         return self.kind in MOVABLE_KINDS
 
@@ -243,7 +243,7 @@ class Robot:
 
     def movable_joints(self) -> Iterator[Joint]:
         """Yields the movable joints."""
-        return (joint for joint in self.joints if joint.movable)
+        return (joint for joint in self.joints if joint.is_movable)
 
     def root_links(self) -> list[str]:
         """Returns the names of the links without parent joint; a valid URDF has one."""

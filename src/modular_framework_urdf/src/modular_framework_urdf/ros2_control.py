@@ -54,7 +54,7 @@ class Ros2ControlHardware:
     joints: tuple[Ros2ControlJoint, ...]
 
     @property
-    def simulated(self) -> bool:
+    def is_simulated(self) -> bool:
         """Whether the hardware is simulated."""
         return self.plugin in SIMULATION_PLUGINS
 

@@ -132,10 +132,13 @@ class _Reader:
         self._where = where
 
     def read(self, root: Element) -> SemanticDescription:
-        required = self._required
+        required_attribute = self._required_attribute
         virtual_joints = tuple(
             VirtualJoint(
-                required(e, "name"), required(e, "type"), required(e, "parent_frame"), required(e, "child_link")
+                required_attribute(e, "name"),
+                required_attribute(e, "type"),
+                required_attribute(e, "parent_frame"),
+                required_attribute(e, "child_link"),
             )
             for e in root.findall("virtual_joint")
         )
@@ -145,20 +148,23 @@ class _Reader:
             group_states=self._group_states(root, {joint.name: joint for joint in virtual_joints}),
             end_effectors=tuple(
                 EndEffector(
-                    required(e, "name"), required(e, "group"), required(e, "parent_link"), e.get("parent_group", "")
+                    required_attribute(e, "name"),
+                    required_attribute(e, "group"),
+                    required_attribute(e, "parent_link"),
+                    e.get("parent_group", ""),
                 )
                 for e in root.findall("end_effector")
             ),
             virtual_joints=virtual_joints,
-            passive_joints=frozenset(required(e, "name") for e in root.findall("passive_joint")),
+            passive_joints=frozenset(required_attribute(e, "name") for e in root.findall("passive_joint")),
             touching_links=tuple(
-                dict.fromkeys(required(e, "link").strip() for e in root.findall("disable_default_collisions"))
+                dict.fromkeys(required_attribute(e, "link").strip() for e in root.findall("disable_default_collisions"))
             ),
             enabled_pairs=frozenset(map(self._pair, root.findall("enable_collisions"))),
             disabled_pairs={self._pair(e): e.get("reason", "") for e in root.findall("disable_collisions")},
         )
 
-    def _required(self, element: Element, attribute: str) -> str:
+    def _required_attribute(self, element: Element, attribute: str) -> str:
         value = element.get(attribute)
         if value is None:
             raise XmlError(
@@ -170,11 +176,13 @@ class _Reader:
 
     def _group(self, element: Element) -> GroupSpec:
         return GroupSpec(
-            self._required(element, "name"),
+            self._required_attribute(element, "name"),
             tuple(
-                GroupMember("chain", "", self._required(item, "base_link"), self._required(item, "tip_link"))
+                GroupMember(
+                    "chain", "", self._required_attribute(item, "base_link"), self._required_attribute(item, "tip_link")
+                )
                 if item.tag == "chain"
-                else GroupMember(item.tag, self._required(item, "name"))
+                else GroupMember(item.tag, self._required_attribute(item, "name"))
                 for item in element
                 if item.tag in ("joint", "link", "chain", "group")
             ),
@@ -187,14 +195,16 @@ class _Reader:
         for element in root.findall("group_state"):
             values: dict[str, float] = {}
             for item in element.findall("joint"):
-                name, numbers = self._required(item, "name"), self._positions(item)
+                name, numbers = self._required_attribute(item, "name"), self._positions(item)
                 joint = virtual_joints.get(name.strip())
                 values |= self._variables(item, joint, numbers) if joint else {name: numbers[0]}
-            states.setdefault(self._required(element, "group"), {})[self._required(element, "name")] = values
+            states.setdefault(self._required_attribute(element, "group"), {})[
+                self._required_attribute(element, "name")
+            ] = values
         return states
 
     def _positions(self, element: Element) -> list[float]:
-        text = self._required(element, "value")
+        text = self._required_attribute(element, "value")
         try:
             numbers = [float(word) for word in text.split()]
             numbers[0]
@@ -220,4 +230,6 @@ class _Reader:
         return dict(zip(joint.variables, numbers, strict=True))
 
     def _pair(self, element: Element) -> frozenset[str]:
-        return frozenset((self._required(element, "link1").strip(), self._required(element, "link2").strip()))
+        return frozenset(
+            (self._required_attribute(element, "link1").strip(), self._required_attribute(element, "link2").strip())
+        )

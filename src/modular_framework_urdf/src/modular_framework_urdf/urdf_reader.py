@@ -94,7 +94,7 @@ class _Attributes:
         value = self.optional(key)
         return default if value is None else value
 
-    def required(self, key: str) -> float:
+    def required_number(self, key: str) -> float:
         return self._numbers(key, self.text(key) or "", 1, "a number")[0]
 
     def vector(self, key: str, default: Vector) -> Vector:
@@ -156,11 +156,11 @@ def _shape(element: Element, owner: str, where: str) -> Shape:
         case "box":
             return Box(attributes.required_vector("size"))
         case "sphere":
-            return Sphere(attributes.required("radius"))
+            return Sphere(attributes.required_number("radius"))
         case "cylinder":
-            return Cylinder(attributes.required("radius"), attributes.required("length"))
+            return Cylinder(attributes.required_number("radius"), attributes.required_number("length"))
         case "capsule":
-            return Capsule(attributes.required("radius"), attributes.required("length"))
+            return Capsule(attributes.required_number("radius"), attributes.required_number("length"))
         case "mesh":
             return MeshFile(element.get("filename", ""), attributes.vector("scale", (1.0, 1.0, 1.0)))
         case tag:

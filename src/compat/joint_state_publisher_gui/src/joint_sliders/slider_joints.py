@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.mimics import Mimic, resolve_mimics
 from modular_framework_urdf.robot import Joint, Robot
 
 DECIMALS = 3
@@ -106,7 +106,7 @@ def slider_joints(robot: Robot, settings: SliderSettings) -> SliderJoints:
     mimics = {name: mimic for name, mimic in settings.dependent_joints.items() if name in movable}
     if settings.use_mimic_tags:
         mimics |= {name: joint.mimic for name, joint in movable.items() if joint.mimic is not None}
-    following = resolved(mimics, movable)
+    following = resolve_mimics(mimics, movable)
     free = {name: _free_joint(joint, settings, warnings) for name, joint in movable.items() if name not in following}
     return SliderJoints(tuple(movable), free, following, tuple(warnings))
 

@@ -70,7 +70,7 @@ def hardware_plan(
         tags = read_ros2_control(urdf, DESCRIPTION) if urdf else ()
     except xml_text.XmlError as error:
         raise LaunchError(str(error)) from None
-    if any(tag.simulated for tag in tags):
+    if any(tag.is_simulated for tag in tags):
         return _simulation(tags, namespace)
     described = [part for tag in tags for part in _parts(tag)]
     if not described:
@@ -87,7 +87,7 @@ def hardware_plan(
 
 def _simulation(tags: Iterable[Ros2ControlHardware], namespace: str) -> HardwarePlan:
     """Returns the simulation, which reads joints and initial positions from the description itself."""
-    others = [tag for tag in tags if not tag.simulated]
+    others = [tag for tag in tags if not tag.is_simulated]
     if others:
         raise LaunchError(
             f"{DESCRIPTION}: <ros2_control name='{others[0].name}'> is {others[0].plugin} beside simulated hardware; "

@@ -41,7 +41,7 @@ def nearest_values(
     Returns:
         Positions of the free joints. The error sums metres and radians, as in inverse kinematics.
     """
-    movable = [joint.name for joint in chain if joint.movable]
+    movable = [joint.name for joint in chain if joint.is_movable]
     values = {joint.name: joint.bounded(start[joint.name]) for joint in free}
     best, min_error = dict(values), math.inf
     for _ in range(STEPS):

@@ -47,7 +47,7 @@ def _walk(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[list[
     for joint in chain:
         position = position + rotation.apply(joint.xyz)
         rotation = rotation * Rotation.from_euler("xyz", joint.rpy)
-        if not joint.movable:
+        if not joint.is_movable:
             continue
         unit = np.asarray(joint.axis) / max(float(np.linalg.norm(joint.axis)), 1e-12)
         axis = rotation.apply(unit)

@@ -193,8 +193,8 @@ class GroupJointTargets(GroupSettings):
     def _nearest_values(self, link: str, pose: PoseStamped) -> dict[str, float]:
         """Returns joint values near the current target that minimise the pose error of a link."""
         start = {**self._state.positions(self._group_names()), **self._joint_target}
-        moved = [joint for joint in self._group.active_joints if joint.movable]
-        base = next(joint.parent for joint in self._group.joints if joint.movable)
+        moved = [joint for joint in self._group.active_joints if joint.is_movable]
+        base = next(joint.parent for joint in self._group.joints if joint.is_movable)
         base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
         base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
         rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))

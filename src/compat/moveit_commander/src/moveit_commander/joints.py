@@ -49,16 +49,16 @@ class Joint:
     @property
     def variables(self) -> tuple[Joint, ...]:
         """Returns the variables: the parts of a planar or floating joint, the joint if movable, or nothing."""
-        return self.parts or ((self,) if self.movable else ())
+        return self.parts or ((self,) if self.is_movable else ())
 
     @property
-    def movable(self) -> bool:
+    def is_movable(self) -> bool:
         return self.kind in MOVABLE_KINDS
 
     @property
     def active(self) -> bool:
         """Whether the joint moves independently: neither fixed nor mimic."""
-        return bool(self.parts) or (self.movable and not self.leader)
+        return bool(self.parts) or (self.is_movable and not self.leader)
 
     @property
     def default(self) -> float:

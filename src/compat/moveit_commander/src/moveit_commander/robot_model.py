@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from modular_framework_urdf import srdf_reader
-from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.mimics import Mimic, resolve_mimics
 from modular_framework_urdf.planning_groups import GroupError, KinematicTree
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription, VirtualJoint, read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -194,9 +194,9 @@ class RobotModel:
 
 def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
     """Returns the joints with each mimic joint directly following the leader of its chain of mimic joints."""
-    moving = [joint for joint in joints if joint.movable]
+    moving = [joint for joint in joints if joint.is_movable]
     try:
-        mimics = resolved(
+        mimics = resolve_mimics(
             {joint.name: Mimic(joint.leader, joint.multiplier, joint.offset) for joint in moving if joint.leader},
             [joint.name for joint in moving],
         )

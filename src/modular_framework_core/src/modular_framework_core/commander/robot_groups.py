@@ -107,7 +107,7 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
         members = [joints[member] for member in tree.group_joints(name, semantics) if member in joints]
     except GroupError as error:
         raise RobotModelError(str(error)) from error
-    active = tuple(_joint(joint) for joint in members if joint.movable and joint.mimic is None)
+    active = tuple(_joint(joint) for joint in members if joint.is_movable and joint.mimic is None)
     states = {state: dict(positions) for state, positions in semantics.group_states.get(name, {}).items()}
     return Group(name, active, _tip_link(semantics.groups[name], semantics.groups), states)
 

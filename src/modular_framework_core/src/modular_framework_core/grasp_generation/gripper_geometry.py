@@ -23,7 +23,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
     max_z_on_lines,
 )
 from modular_framework_core.grasp_generation.hand_axes import hand_axes
-from modular_framework_urdf.mimics import resolved
+from modular_framework_urdf.mimics import resolve_mimics
 from modular_framework_urdf.planning_groups import KinematicTree
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -291,7 +291,7 @@ class _Model:
         self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
         mimics = {name: joint.mimic for name, joint in self.joints.items() if joint.mimic is not None}
         try:
-            self._mimics = resolved(mimics, [joint.name for joint in robot.movable_joints()])
+            self._mimics = resolve_mimics(mimics, [joint.name for joint in robot.movable_joints()])
         except ValueError as error:
             raise GripperGeometryError(str(error)) from error
 

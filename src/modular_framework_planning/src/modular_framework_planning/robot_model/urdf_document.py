@@ -18,7 +18,7 @@ from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.joint_limits import JointLimits, described_limits
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
-from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.mimics import Mimic, resolve_mimics
 from modular_framework_urdf.robot import MOVABLE_KINDS, Link, PlacedShapes, Robot
 from modular_framework_urdf.srdf_reader import VirtualJoint
 from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
@@ -98,7 +98,7 @@ def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
     """Returns the resolved mimic joints, and notes about ignored joints; raises ModelError for an invalid mimic."""
     direct = {joint.name: joint.mimic for joint in robot.movable_joints() if joint.mimic is not None}
     try:
-        mimics = resolved(direct, [joint.name for joint in robot.movable_joints()])
+        mimics = resolve_mimics(direct, [joint.name for joint in robot.movable_joints()])
     except ValueError as error:
         raise ModelError(str(error)) from error
     return mimics, tuple(

@@ -89,7 +89,7 @@ def _check_ends(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
 
 
 def _check_axis(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
-    if joint.movable and not any(joint.axis):
+    if joint.is_movable and not any(joint.axis):
         faults.add(
             tree.location(joint.line), f"joint '{joint.name}': its axis is 0 0 0; give it a direction, such as 0 0 1"
         )
@@ -114,7 +114,7 @@ def _check_limit(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
 def _check_mimic(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
     if joint.mimic is None:
         return
-    leaders = [name for name, item in tree.joints.items() if item.movable and name != joint.name]
+    leaders = [name for name, item in tree.joints.items() if item.is_movable and name != joint.name]
     if joint.mimic.leader not in leaders:
         faults.add_unknown(
             tree.location(joint.line), f"joint '{joint.name}' mimics: joint", joint.mimic.leader, leaders

@@ -86,7 +86,7 @@ def joints_below(tree: RobotTree, link: str) -> list[Joint]:
 
 def is_driven(joint: Joint) -> bool:
     """Returns whether a joint is movable and not a mimic joint."""
-    return joint.movable and joint.mimic is None
+    return joint.is_movable and joint.mimic is None
 
 
 def find_parts(
@@ -113,8 +113,8 @@ def find_parts(
 
 
 def _finger_joints(tree: RobotTree, links: Sequence[str]) -> list[Joint]:
-    parents = [joint for link in links if (joint := tree.parent_joint.get(link)) is not None and joint.movable]
-    descendants = [joint for link in links for joint in joints_below(tree, link) if joint.movable]
+    parents = [joint for link in links if (joint := tree.parent_joint.get(link)) is not None and joint.is_movable]
+    descendants = [joint for link in links for joint in joints_below(tree, link) if joint.is_movable]
     joints = list({joint.name: joint for joint in (*parents, *descendants)}.values())
     if not any(map(is_driven, joints)):
         raise CreationError(
@@ -132,7 +132,7 @@ def _mimic_sets(tree: RobotTree) -> list[list[Joint]]:
             if leader.mimic is None or leader.mimic.leader not in tree.joints:
                 break
             leader = tree.joints[leader.mimic.leader]
-        if leader is not joint and joint.movable:
+        if leader is not joint and joint.is_movable:
             followers.setdefault(leader.name, []).append(joint)
     return [
         [tree.joints[leader], *items]

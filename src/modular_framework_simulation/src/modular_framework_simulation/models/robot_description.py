@@ -20,7 +20,7 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
-from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.mimics import Mimic, resolve_mimics
 from modular_framework_urdf.robot import Joint, Limit, Robot
 from modular_framework_urdf.ros2_control import Ros2ControlJoint, read_ros2_control
 from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
@@ -114,7 +114,7 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
     that forbid the relation (Robotiq 2F-85: multiplier -1, limits 0 to 0.88).
     """
     try:
-        mimics = resolved(
+        mimics = resolve_mimics(
             {joint.name: joint.mimic for joint in joints if joint.mimic is not None}, [joint.name for joint in joints]
         )
     except ValueError as error:
@@ -166,7 +166,7 @@ def _simulated_joints(text: str, robot: Robot) -> list[Ros2ControlJoint]:
     except xml_text.XmlError as error:
         raise DescriptionError(error.where, error.found, error.allowed) from error
     movable = [joint.name for joint in robot.movable_joints()]
-    joints = [joint for tag in tags if tag.simulated for joint in tag.joints]
+    joints = [joint for tag in tags if tag.is_simulated for joint in tag.joints]
     for joint in joints:
         if joint.name not in movable:
             where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"

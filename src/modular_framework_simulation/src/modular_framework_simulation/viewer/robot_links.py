@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_urdf.mimics import resolved
+from modular_framework_urdf.mimics import resolve_mimics
 from modular_framework_urdf.robot import Joint, Robot
 
 
@@ -33,7 +33,7 @@ class RobotLinks:
         self._joints = _sorted_from_root(self.root, robot.joints)
         names = [joint.name for joint in robot.movable_joints()]
         try:
-            self._mimics = resolved({j.name: j.mimic for j in robot.joints if j.mimic is not None}, names)
+            self._mimics = resolve_mimics({j.name: j.mimic for j in robot.joints if j.mimic is not None}, names)
         except ValueError as error:
             raise DescriptionError("robot_description", str(error), "correct the description") from None
         self._origins = {j.name: Pose.from_xyz_rpy(j.origin.xyz, j.origin.rpy) for j in self._joints}
@@ -47,7 +47,9 @@ class RobotLinks:
         poses = {self.root: Pose()}
         for joint in self._joints:
             pose = poses[joint.parent] @ self._origins[joint.name]
-            poses[joint.child] = pose @ _motion(joint, self._position(joint.name, positions)) if joint.movable else pose
+            poses[joint.child] = (
+                pose @ _motion(joint, self._position(joint.name, positions)) if joint.is_movable else pose
+            )
         return poses
 
     def tip(self, joints: Collection[str]) -> str:
