@@ -77,7 +77,7 @@ def test_compiled_verdicts_are_those_of_the_single_constraints(model: RobotModel
             for kind in list(Parameterization)[: int(rng.integers(3))]
         ],
     )
-    assert constraints.satisfied(positions) == all(item.satisfied for item in constraints.evaluate(positions))
+    assert constraints.are_satisfied(positions) == all(item.satisfied for item in constraints.evaluate(positions))
 
 
 REGIONS = [
@@ -94,7 +94,7 @@ def test_a_point_is_brought_into_every_region_from_outside_of_it(model: RobotMod
     constraints = in_region(model, solid, pin.SE3(Rotation.random(rng=rng).as_matrix(), np.array([0.4, 0.2, 1.3])))
     for _ in range(100):
         start = random_state(model, rng)
-        outside += not constraints.satisfied(start)
+        outside += not constraints.are_satisfied(start)
         moved = constraints.project(start, indices)
         if moved is not None:
             found += 1

@@ -146,7 +146,7 @@ def test_a_position_is_kept_in_any_of_the_regions_of_a_turned_frame(model: Robot
         tuple((SOLIDS[kind], pose) for kind, pose in zip(kinds, poses, strict=True)),
     )
     expected = any(inside(kind, (reference * pose).actInv(point)) for kind, pose in zip(kinds, poses, strict=True))
-    assert KinematicConstraints(model, positions=[constraint]).satisfied(positions) == expected
+    assert KinematicConstraints(model, positions=[constraint]).are_satisfied(positions) == expected
 
 
 def test_a_joint_without_ends_is_compared_the_short_way_round() -> None:
@@ -229,7 +229,7 @@ def test_all_kinds_together_are_met_and_joints_keep_their_tolerance(model: Robot
     )
     for _ in range(20):
         found = constraints.sample(rng, model.default_positions(), indices)
-        assert found is not None and constraints.satisfied(found)
+        assert found is not None and constraints.are_satisfied(found)
         assert 0.1 - 1e-6 <= found[pan] <= 0.9 + 1e-6
         assert np.abs(model.link_transforms(found)[TIP].translation - region.translation).max() <= 0.1 + 1e-6
         assert constraints.describe(found) == ""
@@ -245,11 +245,11 @@ def test_a_moving_frame_moves_the_constraint_with_it(model: RobotModel) -> None:
     kept = KinematicConstraints(
         model, positions=[PositionConstraint(on_link(model), np.zeros(3), forearm, ((SphereSolid(0.02), pose),))]
     )
-    assert kept.satisfied(positions)
+    assert kept.are_satisfied(positions)
     positions[indices[0]] += 1.0
-    assert kept.satisfied(positions), "the joint before the frame turns both"
+    assert kept.are_satisfied(positions), "the joint before the frame turns both"
     positions[indices[3]] += 1.0
-    assert not kept.satisfied(positions)
+    assert not kept.are_satisfied(positions)
     assert "m outside its region" in kept.describe(positions)
     found = kept.project(positions, indices)
     assert found is not None

@@ -107,7 +107,7 @@ def test_a_tolerant_pose_is_met_where_the_exact_one_collides(
         resolve(PoseGoal(TIP, goal.target), world=blocked)
     assert caught.value.code is ErrorCode.GOAL_IN_COLLISION
     for values in resolve(goal, world=blocked):
-        assert loose.satisfied(full_positions(model, values))
+        assert loose.are_satisfied(full_positions(model, values))
 
 
 def test_a_free_rotation_makes_a_goal_nearer_than_the_exact_pose(
@@ -128,7 +128,7 @@ def test_any_mix_of_constraints_is_a_goal(model: RobotModel, resolve: Resolve) -
     )
     found = resolve(ConstraintGoal(mixed))
     assert len(found) > 1
-    assert all(mixed.satisfied(full_positions(model, values)) for values in found)
+    assert all(mixed.are_satisfied(full_positions(model, values)) for values in found)
 
 
 def test_goal_states_are_chosen_among_those_that_keep_the_path_constraints(model: RobotModel, resolve: Resolve) -> None:

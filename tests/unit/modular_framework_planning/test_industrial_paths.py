@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
-from modular_framework_planning.planners.pilz.pose_path import LinePath, arc_around_centre, arc_through_interim, timed
+from modular_framework_planning.planners.pilz.pose_path import (
+    LinePath,
+    arc_around_centre,
+    arc_through_interim,
+    time_pose_path,
+)
 from modular_framework_planning.planners.pilz.velocity_profile import (
     MIN_GAP_S,
     ROUNDING_S,
@@ -68,7 +73,7 @@ def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
 
 
 def test_the_rotation_speeds_up_in_the_ratio_of_the_translation() -> None:
-    motion = timed(LinePath.between(at(0, 0, 0), at(0, 0, 0, (0, 0, 1.0))), LIMITS, 1.0, 1.0)
+    motion = time_pose_path(LinePath.between(at(0, 0, 0), at(0, 0, 0, (0, 0, 1.0))), LIMITS, 1.0, 1.0)
     assert motion is not None
     turned = [float(np.linalg.norm(pin.log3(motion.pose(time_s).rotation))) for time_s in (0.1, 0.2, 0.3)]
     second = (turned[2] - 2 * turned[1] + turned[0]) / 0.1**2
@@ -76,12 +81,12 @@ def test_the_rotation_speeds_up_in_the_ratio_of_the_translation() -> None:
 
 
 def test_translation_and_rotation_arrive_together() -> None:
-    motion = timed(LinePath.between(at(0, 0, 0), at(0.3, 0, 0, (0, 0, 1.2))), LIMITS, 0.5, 0.5)
+    motion = time_pose_path(LinePath.between(at(0, 0, 0), at(0.3, 0, 0, (0, 0, 1.2))), LIMITS, 0.5, 0.5)
     assert motion is not None
     for time_s in np.linspace(0.0, motion.duration_s, 17):
         pose = motion.pose(float(time_s))
         assert pose.translation[0] / 0.3 == pytest.approx(np.linalg.norm(pin.log3(pose.rotation)) / 1.2, abs=1e-9)
-    assert timed(LinePath.between(at(0, 0, 0), at(0, 0, 0)), LIMITS, 1.0, 1.0) is None
+    assert time_pose_path(LinePath.between(at(0, 0, 0), at(0, 0, 0)), LIMITS, 1.0, 1.0) is None
 
 
 def test_a_line_is_straight_and_turns_about_one_axis() -> None:

@@ -260,7 +260,7 @@ def test_path_constraints_hold_along_the_whole_motion(
     motion = MotionChecker(ExactCollisionChecker(wall_scene(model)), model.group(GROUP).indices, answer.start)
     curve = answer.trajectory.curve(0.004)
     assert arrives(answer) and len(curve) > 100
-    assert all(constraints.satisfied(motion.full_positions(values)) for values in curve)
+    assert all(constraints.are_satisfied(motion.full_positions(values)) for values in curve)
 
 
 def test_a_start_or_goal_that_violates_path_constraints_says_so(model: RobotModel, pipeline: PlanningPipeline) -> None:
@@ -282,7 +282,7 @@ def test_requests_reach_another_process_whole(model: RobotModel) -> None:
     back = from_bytes(to_bytes(request), model)
     assert back.scene.model is model and back.goals == request.goals
     assert np.array_equal(back.scene.positions, request.scene.positions)
-    assert back.path_constraints.satisfied(request.scene.positions)
+    assert back.path_constraints.are_satisfied(request.scene.positions)
     assert not ExactCollisionChecker(back.scene).contacts(back.scene.positions)
 
 

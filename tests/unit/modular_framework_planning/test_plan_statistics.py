@@ -107,12 +107,12 @@ def test_searches_side_by_side_are_counted_together(small: RobotModel) -> None:
 def test_a_part_inside_another_one_counts_for_itself(small: RobotModel) -> None:
     checker, phases = ExactCollisionChecker(scene_with(small, WALL)), PhaseTimes()
     state = small.with_mimics(np.zeros(len(small.joint_names)))
-    with phases.measured(SETUP):
+    with phases.measure(SETUP):
         checker.is_free(state)
         phases.watch(checker)
-    with phases.measured(SEARCH):
+    with phases.measure(SEARCH):
         checker.is_free(state)
-        with phases.measured(SETUP):
+        with phases.measure(SETUP):
             checker.is_free(state)
             checker.is_free(state)
     checks = phases.statistics().checks
@@ -122,7 +122,7 @@ def test_a_part_inside_another_one_counts_for_itself(small: RobotModel) -> None:
 def test_a_checker_that_does_not_count_has_times_alone(small: RobotModel) -> None:
     phases = PhaseTimes()
     phases.watch(PlainCoalChecker(scene_with(small, WALL)))
-    with phases.measured(SEARCH):
+    with phases.measure(SEARCH):
         pass
     assert not phases.statistics().checks and set(phases.statistics().phases_s) == {SEARCH}
 

@@ -24,7 +24,7 @@ from modular_framework_planning.planners.ompl.planner import OmplPlanner, connec
 from modular_framework_planning.planners.pilz.command_planner import CommandPlanner
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
-from modular_framework_planning.planning_interface.path_repair import EdgeError, repaired
+from modular_framework_planning.planning_interface.path_repair import EdgeError, repair_path
 from modular_framework_planning.planning_interface.phase_times import PhaseTimes
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
@@ -81,8 +81,8 @@ class Stubborn(Coarse):
     """Finds no way round."""
 
     @staticmethod
-    def repaired(problem: PlanningProblem, vertices: np.ndarray) -> np.ndarray:
-        return repaired(problem, vertices, lambda *_: None)
+    def repair_path(problem: PlanningProblem, vertices: np.ndarray) -> np.ndarray:
+        return repair_path(problem, vertices, lambda *_: None)
 
 
 def test_a_colliding_edge_is_repaired_and_the_search_is_not_begun_again(
@@ -199,12 +199,12 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
     asked = request(model)
     PlanningPipeline(pool, PipelineSettings(seed=1), planner, adapters=make_adapters()).plan(asked)
     problem = planner.asked[0]
-    way = OmplPlanner().repaired(problem, np.array([START, GOAL, START]))
+    way = OmplPlanner().repair_path(problem, np.array([START, GOAL, START]))
     checker = ExactCollisionChecker(asked.scene, problem.group.indices)
     assert checker.path_is_free(problem.motion.full_path(way), problem.settings.finest_step)
     assert np.allclose(way[0], START) and (np.abs(way - GOAL).max(axis=1) < 1e-9).any()
     with pytest.raises(EdgeError, match="edge 1 of 2"):
-        Stubborn.repaired(problem, np.array([START, GOAL, START]))
+        Stubborn.repair_path(problem, np.array([START, GOAL, START]))
 
 
 def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock(

@@ -164,7 +164,7 @@ def test_ruckig_smoothing_keeps_all_limits_and_the_ends(gentle: RobotModel) -> N
     assert (largest(smooth, 2) <= gentle.max_acceleration[indices]).all()
     assert (largest(smooth, 1) <= gentle.max_velocity[indices]).all()
     assert np.allclose(smooth.positions[[0, -1]], [START, GOAL]) and np.diff(smooth.times).min() > 0
-    assert plain.duration_s < smooth.duration_s < plain.slowed(2.0).duration_s
+    assert plain.duration_s < smooth.duration_s < plain.with_slowdown(2.0).duration_s
 
 
 def test_smoothing_leaves_a_motion_within_the_limits_of_jerk_alone(model: RobotModel) -> None:

@@ -80,7 +80,7 @@ def use(model: RobotModel) -> None:
     """Maps, solves, plans in two ways, with and without path constraints, and asks for contacts."""
     far = np.array([[2.0, 0.3, 0.5], [2.0, 0.4, 0.5]])
     voxels = empty_map(0.05).with_point_cloud(np.array([0.0, 0.0, 1.0]), far, far[:0], far + 1.0)
-    voxels = read_stream(write_full(voxels), 0.05, False).freed(voxels.keys[:1])
+    voxels = read_stream(write_full(voxels), 0.05, False).with_free_cells(voxels.keys[:1])
     read_stream(write_binary(voxels), 0.05, True)
     group = model.group(GROUP)
     positions = model.merge(model.default_positions(), dict(zip(group.joints, START, strict=True)))

@@ -31,7 +31,7 @@ class CheckCounts:
     states: int
 
     @property
-    def refused(self) -> int:
+    def colliding_checks(self) -> int:
         """Number of checks that found a collision."""
         return self.touching_by_bounds + self.touching_exactly
 
@@ -106,10 +106,10 @@ class PlanStatistics:
         if counts is None or not counts.asked:
             return text
         text += f": {counts.asked:,} collision checks, {counts.undecided / counts.asked:.1%} undecided by the bounds"
-        if self.refusals is None or not counts.refused:
+        if self.refusals is None or not counts.colliding_checks:
             return text
         bodies = f"'{self.refusals.first}' and '{self.refusals.second}'"
-        fraction = counts.refused / counts.asked
+        fraction = counts.colliding_checks / counts.asked
         return f"{text}, {fraction:.0%} in collision: " + (
             f"narrow passage between {bodies}" if fraction >= NARROW_FRACTION else f"most often {bodies}"
         )

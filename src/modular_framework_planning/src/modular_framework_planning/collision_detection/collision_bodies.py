@@ -126,7 +126,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         moving: Indices of the joints that will move; None for all joints.
     """
     moving_joints = None if moving is None else tuple(int(joint) for joint in moving)
-    named, links = scene.acm.named, len(scene.model.link_geometries)
+    named, links = scene.acm.entry_names, len(scene.model.link_geometries)
     others = tuple(
         part.body if part.body.kind != WORLD or part.body.name in named else UNNAMED for part in parts[links:]
     )
@@ -164,7 +164,7 @@ def _watched_pairs(
     robot_count = int(np.count_nonzero(kinds != WORLD))
     support_ids, rigid_ids = _rigid_joints(model, moving)
     acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
-    allowed = _allowed(acm, bodies[:robot_count], others)
+    allowed = _allowed_pairs(acm, bodies[:robot_count], others)
     indices, held = np.arange(len(bodies)), kinds == ATTACHED
     first, second = indices[:robot_count, None], indices[None, links:]  # world bodies do not move mutually
     is_rigid = (rigid_ids[joints[first]] == rigid_ids[joints[second]]) & ~held[first] & ~held[second]
@@ -177,7 +177,7 @@ def _watched_pairs(
     )
 
 
-def _allowed(acm: AllowedCollisionMatrix, bodies: Sequence[Body], others: Sequence[Body]) -> NDArray[np.bool_]:
+def _allowed_pairs(acm: AllowedCollisionMatrix, bodies: Sequence[Body], others: Sequence[Body]) -> NDArray[np.bool_]:
     """Returns whether each body (rows) may touch each of the others (columns)."""
     rows, columns = ({body: index for index, body in enumerate(dict.fromkeys(items))} for items in (bodies, others))
     verdicts = np.array([[_may_touch(acm, body, other) for other in columns] for body in rows], dtype=bool)

@@ -49,7 +49,7 @@ class ExactCollision:
             self._poses[part_index] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
         return self._poses[part_index]
 
-    def _placed(self, part_index: int) -> tuple[Any, Any]:
+    def _placed_geometry(self, part_index: int) -> tuple[Any, Any]:
         """Returns a part's Coal geometry, built on first use, and its pose."""
         return self._parts[part_index].source.geometry, self._pose(part_index)
 
@@ -75,7 +75,9 @@ class ExactCollision:
 
     def _distance_to_sphere(self, part_index: int, centre: Array, radius: float) -> float:
         sphere = coal.Sphere(radius), coal.Transform3s(np.eye(3), centre)
-        return float(coal.distance(*self._placed(part_index), *sphere, coal.DistanceRequest(), coal.DistanceResult()))
+        return float(
+            coal.distance(*self._placed_geometry(part_index), *sphere, coal.DistanceRequest(), coal.DistanceResult())
+        )
 
     def _bounding_sphere(self, part_index: int) -> tuple[Array, float]:
         if part_index not in self._bounding_spheres:
@@ -88,7 +90,7 @@ class ExactCollision:
         pair = self._pairs[pair_index]
         request.security_margin = pair.margin
         result = coal.CollisionResult()
-        coal.collide(*self._placed(pair.first), *self._placed(pair.second), request, result)
+        coal.collide(*self._placed_geometry(pair.first), *self._placed_geometry(pair.second), request, result)
         return result
 
     def touching_pair(self, positions: Array, pair_indices: Iterable[int]) -> int:
@@ -155,7 +157,7 @@ class ExactCollision:
 
     def _distance(self, pair_index: int) -> float:
         pair = self._pairs[pair_index]
-        placed = *self._placed(pair.first), *self._placed(pair.second)
+        placed = *self._placed_geometry(pair.first), *self._placed_geometry(pair.second)
         return float(coal.distance(*placed, coal.DistanceRequest(), coal.DistanceResult()))
 
 

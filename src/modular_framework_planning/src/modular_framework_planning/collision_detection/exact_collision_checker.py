@@ -202,9 +202,9 @@ class ExactCollisionChecker:
             for index, contact in self._exact.contacts(positions, pair_indices)
             if index not in self._tolerated or contact.depth > self._tolerated[index] + DEPTH_TOLERANCE_M
         ]
-        return sorted(found or self._surrounded(positions), key=lambda item: -item.depth)
+        return sorted(found or self._surrounding_contacts(positions), key=lambda item: -item.depth)
 
-    def _surrounded(self, positions: Array) -> list[Contact]:
+    def _surrounding_contacts(self, positions: Array) -> list[Contact]:
         row = surrounded_pair_at(np.asarray(positions, dtype=float), *self._compiled.arguments)
         if row < 0:
             return []

@@ -116,7 +116,7 @@ def _pair_arrays(
     model: RobotModel, groups: Grouping, pairs: WatchedPairs, body_of_part: bytes, rows: bytes
 ) -> PairArrays:
     bodies = _Bodies(*np.frombuffer(rows).reshape(len(_Bodies._fields), -1))
-    ordered, is_compiled = _ordered(bodies, np.frombuffer(body_of_part, dtype=np.int64)[pairs.parts])
+    ordered, is_compiled = _ordered_pairs(bodies, np.frombuffer(body_of_part, dtype=np.int64)[pairs.parts])
     firsts, kinds = _distinct(ordered, pairs.margins, is_compiled)
     both = ordered[firsts]
     first, second = both.T
@@ -149,7 +149,7 @@ def _pair_arrays(
     )
 
 
-def _ordered(bodies: _Bodies, both: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _ordered_pairs(bodies: _Bodies, both: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Orders each pair so that the first body has a surface and the second, if possible, a closed form.
 
     Args:

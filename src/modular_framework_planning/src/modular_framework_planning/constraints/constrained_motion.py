@@ -80,7 +80,7 @@ def warm_up(model: RobotModel) -> None:
         [OrientationConstraint(frame, planning_frame, np.eye(3), np.full(3, np.pi))],
     )
     indices = np.array([0])
-    constraints.satisfied(positions)
+    constraints.are_satisfied(positions)
     constraints.edges_satisfied(np.array([positions, positions]), 1.0)
     constraints.project(positions, indices)
     ConstrainedMotion(constraints, indices, positions, 1.0, 1.0).connect(np.zeros(1), np.ones(1))

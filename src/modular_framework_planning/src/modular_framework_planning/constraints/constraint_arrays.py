@@ -70,7 +70,7 @@ def constraint_arrays(
         tree=tree,
         ranges=_matrix([(item.target, item.below, item.above) for item in joints], 3),
         is_continuous=np.array([item.is_continuous for item in joints], dtype=bool),
-        kinds=np.array([POINT] * len(positions) + [_kind(item) for item in orientations], dtype=np.int64),
+        kinds=np.array([POINT] * len(positions) + [_orientation_kind(item) for item in orientations], dtype=np.int64),
         frames=np.array([[rows_by_joint[frame.joint] for frame in pair] for pair in pairs], dtype=np.int64).reshape(
             -1, 2
         ),
@@ -127,7 +127,7 @@ def _supports(model: RobotModel, frame: FrameOnRobot) -> set[int]:
     return {int(joint_id) for joint_id in model.pin_model.supports[frame.joint] if joint_id > 0}
 
 
-def _kind(item: OrientationConstraint) -> int:
+def _orientation_kind(item: OrientationConstraint) -> int:
     return EULER_ANGLES if item.parameterization is Parameterization.XYZ_EULER_ANGLES else ROTATION_VECTOR
 
 
@@ -139,7 +139,7 @@ def _point_placements(item: PositionConstraint) -> list[Array]:
 
 def _rotation_placements(item: OrientationConstraint) -> list[Array]:
     link, reference = (frame.placement.homogeneous[:3].copy() for frame in (item.link, item.reference))
-    if _kind(item) == EULER_ANGLES:
+    if _orientation_kind(item) == EULER_ANGLES:
         reference[:, :3] = reference[:, :3] @ item.target
     else:
         link[:, :3] = link[:, :3] @ item.target.T

@@ -76,7 +76,7 @@ class KinematicConstraints:
         pin.forwardKinematics(self.model.pin_model, self._data, positions)
         return [item.evaluate(self._data, positions) for item in self._all]
 
-    def satisfied(self, positions: Array) -> bool:
+    def are_satisfied(self, positions: Array) -> bool:
         """Checks that a state satisfies all constraints."""
         return self.first_violated(np.asarray(positions, dtype=float)[None]) < 0
 

@@ -158,7 +158,7 @@ class InverseKinematics:
         solutions = self._from_closed_form(problem)
         if not len(solutions):
             solutions = self._from_search(problem, rng or np.random.default_rng(0))
-        return self._ranked(problem, solutions)
+        return self._ranked_solutions(problem, solutions)
 
     def position_solutions(
         self, tip_link: str, point: Array, position: Array, seed: Array, timeout_s: float | None = None
@@ -176,7 +176,7 @@ class InverseKinematics:
         rotation = self.model.link_transforms(seed)[tip_link].rotation
         target = pin.SE3(rotation, np.asarray(position, dtype=float))
         problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
-        return self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
+        return self._ranked_solutions(problem, self._from_search(problem, np.random.default_rng(0)))
 
     def _problem(
         self,
@@ -221,7 +221,7 @@ class InverseKinematics:
         )
         in_base = base.actInv(problem.target)
         if self._closed_form.locked_joint is None:
-            return self._polished(problem, self._closed_form.solve(in_base))
+            return self._polished_solutions(problem, self._closed_form.solve(in_base))
         sweep_deadline = 0.5 * (
             time.monotonic() + problem.deadline
         )  # the second half of the time is for the numeric search
@@ -230,7 +230,7 @@ class InverseKinematics:
         while not len(solutions) and step >= self.settings.search_resolution and time.monotonic() < sweep_deadline:
             values = np.setdiff1d(self._locked_values(problem, step), tried_values)
             tried_values = np.concatenate([tried_values, values])
-            solutions = self._polished(
+            solutions = self._polished_solutions(
                 problem, np.vstack([self._closed_form.solve(in_base, value) for value in values])
             )
             step *= 0.5
@@ -250,7 +250,7 @@ class InverseKinematics:
         grid = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
         return np.append(grid, np.clip(seed_value, low, high))
 
-    def _polished(self, problem: _Problem, candidates: Array) -> Array:
+    def _polished_solutions(self, problem: _Problem, candidates: Array) -> Array:
         """Returns the refined candidates that reach the target within bounds, and their copies shifted by 2 pi."""
         excess = candidates - (problem.upper + BOUNDS_MARGIN)
         wrapped = candidates - np.where(self._is_revolute, 2.0 * np.pi * np.ceil(excess / (2.0 * np.pi)), 0.0)
@@ -290,7 +290,7 @@ class InverseKinematics:
             starts = rng.uniform(lower, upper, (STARTS_PER_BATCH, len(lower)))
         return full_rotations(solutions, problem.is_revolute, problem.lower, problem.upper, MAX_ROTATED_SOLUTIONS)
 
-    def _ranked(self, problem: _Problem, solutions: Array) -> list[Array]:
+    def _ranked_solutions(self, problem: _Problem, solutions: Array) -> list[Array]:
         """Returns solutions as positions of the whole robot, nearest to the seed first."""
         if not len(solutions):
             return []

@@ -221,7 +221,7 @@ def combined_solutions(
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, target.failure_reason(solver, seed))
     if len(targets) == 1:
         return solutions[0]
-    combined = np.array([_combined(seed, solvers, choice) for choice in product(*solutions)])
+    combined = np.array([_combined_solution(seed, solvers, choice) for choice in product(*solutions)])
     combined = combined[np.argsort(np.linalg.norm(combined - seed, axis=1), kind="stable")]
     pairs = list(zip(targets, solvers, strict=True))
     missed = [
@@ -278,7 +278,7 @@ def sampled_solutions(
         positions = all_constraints.sample(rng, scene.positions, group.indices, attempts=1)
 
 
-def _combined(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:
+def _combined_solution(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:
     """Returns the seed with each solver's joints, and their mimic joints, replaced by the solver's solution."""
     result = seed.copy()
     for solver, solution in zip(solvers, solutions, strict=True):

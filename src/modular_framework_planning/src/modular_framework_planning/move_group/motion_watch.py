@@ -191,7 +191,7 @@ class WatchedMotion:
         assert watch is not None
         with self._watching:
             if self._hit is None and watch.other_joints_moved(scene.positions):
-                others = self._context.execution.others(watch)
+                others = self._context.execution.other_paths(watch)
                 self._hit = watch.robot_collision(self._as_planned(scene), others)
                 if self._hit is not None:
                     self._blocked = "another part of the robot moved and blocks the remaining motion"

@@ -138,7 +138,7 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         )
     if not np.isfinite(values).all():
         raise _broken("an occupancy that is not finite")
-    return _expanded(resolution, starts, depths, np.clip(values, LOWEST, HIGHEST))
+    return _expanded_map(resolution, starts, depths, np.clip(values, LOWEST, HIGHEST))
 
 
 def _broken(content: str) -> GeometryError:
@@ -147,7 +147,7 @@ def _broken(content: str) -> GeometryError:
     )
 
 
-def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values: Values) -> VoxelMap:
+def _expanded_map(resolution: float, starts: Keys, depths: NDArray[np.int64], values: Values) -> VoxelMap:
     """Splits leaves above the lowest level into voxels."""
     counts = np.int64(1) << (3 * (LEVELS - depths))
     total = float(counts.astype(float).sum())

@@ -83,7 +83,7 @@ class VoxelMap:
         """Returns the codes of the voxels that contain points, shape (n, 3) [m], without points outside the tree."""
         return cells_of_points(np.asarray(points, dtype=float).reshape(-1, 3), self.resolution, AXIS_CENTER)
 
-    def updated(self, free: Keys, occupied: Keys, masked: Keys) -> VoxelMap:
+    def with_cloud(self, free: Keys, occupied: Keys, masked: Keys) -> VoxelMap:
         """Returns the map updated by one point cloud.
 
         Args:
@@ -115,9 +115,9 @@ class VoxelMap:
                 f"octomap: the sensor is at {np.round(origin, 2).tolist()} m, outside the map; with voxels of "
                 f"{self.resolution} m, a map reaches {AXIS_CENTER * self.resolution:.0f} m in each direction"
             )
-        return self.updated(np.sort(cells_on_rays(start, ends)), occupied, known)
+        return self.with_cloud(np.sort(cells_on_rays(start, ends)), occupied, known)
 
-    def freed(self, keys: Keys) -> VoxelMap:
+    def with_free_cells(self, keys: Keys) -> VoxelMap:
         """Returns the map with the given voxels set to free; unknown voxels stay unknown."""
         values = self.values.copy()
         values[np.isin(self.keys, keys, assume_unique=True)] = LOWEST

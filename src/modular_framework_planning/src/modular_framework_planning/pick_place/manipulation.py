@@ -231,7 +231,7 @@ class ManoeuvrePlanner:
 
         def objection(before: Array, after: Array) -> str:
             full = motion.full_positions(after)
-            if self._constraints is not None and not self._constraints.satisfied(full):
+            if self._constraints is not None and not self._constraints.are_satisfied(full):
                 return f"path constraints: {self._constraints.describe(full)}"
             return collides(before, after)
 
@@ -323,17 +323,17 @@ class ManoeuvrePlanner:
         ready = open_scene.with_positions(self._full_positions(open_scene, approach[0]))
         at_grasp = open_scene.with_positions(self._full_positions(open_scene, approach[-1]))
         held = self._after_fingers(manoeuvre, at_grasp)
-        stages = [Stage("plan", self._template.scene, _unchanged, to_approach)]
+        stages = [Stage("plan", self._template.scene, _unchanged_scene, to_approach)]
         if before:
             stages.append(Stage("pre_grasp", ready, allow, fingers=before))
         if _moves(approach):
-            stages.append(Stage("approach", ready, allow, self._timed(ready, approach)))
+            stages.append(Stage("approach", ready, allow, self._timed_line(ready, approach)))
         stages.append(Stage(manoeuvre.middle, at_grasp, allow, None, manoeuvre.fingers_after, manoeuvre.effect))
         if _moves(retreat):
-            stages.append(Stage("retreat", held, allow, self._timed(held, retreat)))
+            stages.append(Stage("retreat", held, allow, self._timed_line(held, retreat)))
         return tuple(stages)
 
-    def _timed(self, scene: PlanningScene, rows: Array) -> Trajectory:
+    def _timed_line(self, scene: PlanningScene, rows: Array) -> Trajectory:
         """Times a line that starts at the robot's state in the scene."""
         _, motion = self._checkers(scene)
         return time_line(
@@ -349,7 +349,7 @@ def _moves(rows: Array) -> bool:
     return bool(np.abs(rows - rows[0]).max() > 0.0)
 
 
-def _unchanged(scene: PlanningScene) -> PlanningScene:
+def _unchanged_scene(scene: PlanningScene) -> PlanningScene:
     return scene
 
 

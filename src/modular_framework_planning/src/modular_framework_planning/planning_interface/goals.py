@@ -110,14 +110,14 @@ class GoalResolver:
     def _is_valid(self, values: Array) -> bool:
         """Checks that a state satisfies the path constraints and is free."""
         constraints = self._path_constraints
-        return (constraints is None or constraints.satisfied(self._motion.full_positions(values))) and (
+        return (constraints is None or constraints.are_satisfied(self._motion.full_positions(values))) and (
             self._motion.state_is_free(values)
         )
 
     def _rejection(self, values: Array, subject: str) -> PlanningError:
         """Returns the error that explains why the best candidate of a goal is invalid."""
         full, constraints = self._motion.full_positions(values), self._path_constraints
-        if constraints is not None and not constraints.satisfied(full):
+        if constraints is not None and not constraints.are_satisfied(full):
             return PlanningError(
                 ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
                 f"{subject} violates the path constraints: "
@@ -260,7 +260,7 @@ class GoalResolver:
             solutions = solver.solutions(
                 goal.link, target, seed, timeout_s=math.inf, rng=self._rng, bounds=self._bounds
             )
-            result += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
+            result += [positions[indices] for positions in solutions if allowed.are_satisfied(positions)]
         return result
 
     def _region(self, constraints: KinematicConstraints) -> list[Array]:

@@ -106,13 +106,13 @@ class MotionChecker:
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding state of a polyline, including its start, or None."""
-        for piece in self._unchecked(polyline, step):
+        for piece in self._unchecked_pieces(polyline, step):
             state = self.checker.colliding_state(self.full_path(piece), step)
             if state is not None:
                 return state[self._indices]
         return None
 
-    def _unchecked(self, polyline: Array, step: float) -> list[Array]:
+    def _unchecked_pieces(self, polyline: Array, step: float) -> list[Array]:
         """Returns the polyline without its pieces on free edges; all vertices remain."""
         if step < self._remembered_step:
             return [polyline]

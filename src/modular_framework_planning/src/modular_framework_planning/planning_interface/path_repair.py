@@ -19,7 +19,7 @@ class EdgeError(PlanningError):
     """Raised if an edge of a path is invalid and has no detour."""
 
 
-def repaired(problem: PlanningProblem, path: Array, connect: Connect) -> Array:
+def repair_path(problem: PlanningProblem, path: Array, connect: Connect) -> Array:
     """Returns the path with all edges valid at the step of the final validation.
 
     Args:

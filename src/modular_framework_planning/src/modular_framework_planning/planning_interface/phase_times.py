@@ -54,7 +54,7 @@ class PhaseTimes:
             self._checker, self._counts = checker, checker.check_counts
 
     @contextmanager
-    def measured(self, phase: str) -> Iterator[None]:
+    def measure(self, phase: str) -> Iterator[None]:
         """Adds the time and the checks of the block to a phase, even if the block raises an exception."""
         start_s, before = time.monotonic(), self._counts.copy()
         self._nested_s.append(0.0)

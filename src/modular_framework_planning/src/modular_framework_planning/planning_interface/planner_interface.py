@@ -145,7 +145,7 @@ class PlanningProblem:
             PlanningError: No goal can be reached; gives the reason.
         """
         if not self._goals:
-            with self.phases.measured(GOALS):
+            with self.phases.measure(GOALS):
                 self._goals.append(
                     GoalResolver(
                         self.request,
@@ -190,7 +190,7 @@ class PlanningProblem:
     def state_is_valid(self, values: Array) -> bool:
         """Checks that a joint vector is free of collisions and satisfies the path constraints."""
         return self.motion.state_is_free(values) and (
-            self.constraints is None or self.constraints.satisfied(self.motion.full_positions(values))
+            self.constraints is None or self.constraints.are_satisfied(self.motion.full_positions(values))
         )
 
     def edge_is_valid(self, first: Array, second: Array, step: float | None = None) -> bool:
@@ -275,7 +275,7 @@ class Planner(ABC):
             and do not constrain the motion.
         replaces_bad_values: Whether an unknown planner_id or a scaling factor out of range is replaced by the default
             with a warning, as in OMPL's planning contexts, or raises an error.
-        repairs_edges: Whether `repaired` is implemented. Without it, an invalid motion is a failure of the planner.
+        repairs_edges: Whether `repair_path` is implemented. Without it, an invalid motion is a failure of the planner.
         collision_code: Error code for a start or goal in collision; None for the usual code.
     """
 
@@ -322,7 +322,7 @@ class Planner(ABC):
             PlanningError: There is no path; gives error code and reason.
         """
 
-    def repaired(self, problem: PlanningProblem, vertices: Array) -> Array:
+    def repair_path(self, problem: PlanningProblem, vertices: Array) -> Array:
         """Returns the path with all edges valid at the step of the final validation.
 
         Args:

@@ -10,7 +10,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.trajectory_processing.path_shortening import CompiledEdgeTest, shorten
 
 
-def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
+def shorten_path(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
     """Returns a path with the same ends that is not longer.
 
     Args:

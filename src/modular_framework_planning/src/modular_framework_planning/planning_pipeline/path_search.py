@@ -14,7 +14,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
-from modular_framework_planning.planning_interface.problem_shortening import shortened
+from modular_framework_planning.planning_interface.problem_shortening import shorten_path
 from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
@@ -34,7 +34,7 @@ class PathSearch:
         """Returns the path; later calls repair the same path instead of planning again."""
         _require_start(problem)
         if self._path is None:
-            with problem.phases.measured(SEARCH):
+            with problem.phases.measure(SEARCH):
                 result = self._planner.plan(problem)
             now = time.monotonic()
             self._path = (
@@ -47,14 +47,14 @@ class PathSearch:
             return path
         simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
         if simplify:  # leaves fewer edges to repair
-            vertices = _shortened(problem, vertices, _without_vertices)
+            vertices = _shorten(problem, vertices, _without_vertices)
         if self._planner.repairs_edges:
-            with problem.phases.measured(REPAIR):
-                vertices = self._planner.repaired(problem, vertices)
+            with problem.phases.measure(REPAIR):
+                vertices = self._planner.repair_path(problem, vertices)
         if simplify and problem.constraints is not None:
-            vertices = _shortened(problem, vertices, _cut_along_constraints)
+            vertices = _shorten(problem, vertices, _cut_along_constraints)
         if simplify:
-            vertices = _shortened(problem, vertices, _shortened_path)
+            vertices = _shorten(problem, vertices, _shortened_path)
         self._path = replace(path, vertices=vertices)
         return self._path
 
@@ -79,7 +79,7 @@ def _require_start(problem: PlanningProblem) -> None:
             "FixStartStateCollision",
             contacts,
         )
-    if problem.constraints is not None and not problem.constraints.satisfied(problem.start):
+    if problem.constraints is not None and not problem.constraints.are_satisfied(problem.start):
         raise PlanningError(
             ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
             "start state: "
@@ -88,22 +88,20 @@ def _require_start(problem: PlanningProblem) -> None:
         )
 
 
-def _shortened(
-    problem: PlanningProblem, path: Array, shorten_path: Callable[[PlanningProblem, Array, float], Array]
-) -> Array:
+def _shorten(problem: PlanningProblem, path: Array, method: Callable[[PlanningProblem, Array, float], Array]) -> Array:
     """Shortens a path within the available time, with checks at the step of the final validation."""
     now = time.monotonic()
     limit = min(max(problem.deadline_s, now + SHORTENING_FRACTION * (problem.end_s - now)), now + MAX_SHORTENING_S)
-    with problem.phases.measured(SHORTENING):
-        return shorten_path(problem, path, math.inf if problem.repeatable else limit)
+    with problem.phases.measure(SHORTENING):
+        return method(problem, path, math.inf if problem.repeatable else limit)
 
 
 def _shortened_path(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    return shortened(problem, path, deadline, problem.rng)
+    return shorten_path(problem, path, deadline, problem.rng)
 
 
 def _without_vertices(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    return shortened(problem, path, deadline, None)
+    return shorten_path(problem, path, deadline, None)
 
 
 def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: float) -> Array:

@@ -132,16 +132,16 @@ class PlanningPipeline:
     def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningResult:
         """Repeats search and repair until a motion passes the final validation or time runs out."""
         start_s = time.monotonic()
-        with phases.measured(SETUP):
+        with phases.measure(SETUP):
             problem = self._problem(request, start_s, repeatable, phases)
             phases.watch(problem.checker)
-        adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
+        adapters, fault, steps = self._adapters_for(request), "", list(self._edge_steps())
         search = PathSearch(self._planner)
         while steps:
             problem = replace(problem, step=steps.pop(0), _goals=[])
             try:
                 path = chain(adapters, search)(problem)
-                fault, answer = self._checked(problem, path, start_s)
+                fault, answer = self._validated_result(problem, path, start_s)
             except EdgeError as error:
                 fault, search = error.reason, PathSearch(self._planner)  # the next search checks edges more finely
                 if problem.interrupted():
@@ -159,7 +159,7 @@ class PlanningPipeline:
                     )
                 else:
                     search = PathSearch(self._planner)
-        raise _failed(problem, fault)
+        raise _validation_error(problem, fault)
 
     def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
         """Returns the request adapters, with the Cartesian speed limit added if the request needs it."""
@@ -169,12 +169,12 @@ class PlanningPipeline:
             return self._adapters
         return LimitMaxCartesianLinkSpeed(), *self._adapters
 
-    def _steps(self) -> tuple[float, ...]:
+    def _edge_steps(self) -> tuple[float, ...]:
         """Returns the edge step of each search; an edge that cannot be repaired begins the next search."""
         finest = self.settings.finest_step
         return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
-    def _checked(
+    def _validated_result(
         self, problem: PlanningProblem, path: PlannedPath, start_s: float
     ) -> tuple[str, PlanningResult | None]:
         if path.trajectory is None:
@@ -374,7 +374,7 @@ def _with_fault(error: PlanningError, fault: str) -> PlanningError:
     return PlanningError(error.code, f"{error.reason}; a path was found before, but {fault}", error.contacts)
 
 
-def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
+def _validation_error(problem: PlanningProblem, fault: str) -> PlanningError:
     """Returns the error of a request whose paths all failed the validation."""
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")

@@ -46,7 +46,7 @@ class TrajectoryValidator:
         )
         if key in self._passed and self._passed[key] is problem.checker:
             return None
-        with problem.phases.measured(CHECK):
+        with problem.phases.measure(CHECK):
             describe = _first_fault(problem, path)
         if describe is None:
             self._passed[key] = problem.checker

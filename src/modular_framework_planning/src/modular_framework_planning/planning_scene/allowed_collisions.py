@@ -31,7 +31,7 @@ class AllowedCollisionMatrix:
         return frozenset(self.entries.items()), frozenset(self.defaults.items())
 
     @cached_property
-    def named(self) -> frozenset[str]:
+    def entry_names(self) -> frozenset[str]:
         """Names of bodies with an entry or a default; `allows_others` applies to all other bodies."""
         return frozenset(chain(chain.from_iterable(self.entries), self.defaults))
 

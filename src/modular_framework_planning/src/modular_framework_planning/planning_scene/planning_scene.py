@@ -76,7 +76,7 @@ class PlanningScene:
     version: int = 0
     geometry_version: int = 0
 
-    def _changed(self, **changes: object) -> PlanningScene:
+    def _replace_fields(self, **changes: object) -> PlanningScene:
         version = next(_versions)
         geometry_version = self.geometry_version
         if changes.keys() & {"objects", "attached", "acm", "padding", "octomap"}:
@@ -85,23 +85,23 @@ class PlanningScene:
 
     def with_positions(self, positions: Array) -> PlanningScene:
         """Returns the scene with new joint positions of the robot [rad or m]."""
-        return self._changed(positions=positions)
+        return self._replace_fields(positions=positions)
 
     def with_acm(self, acm: AllowedCollisionMatrix) -> PlanningScene:
         """Returns the scene with a new allowed collision matrix."""
-        return self._changed(acm=acm)
+        return self._replace_fields(acm=acm)
 
     def with_name(self, name: str) -> PlanningScene:
         """Returns the scene with a new name."""
-        return self._changed(name=name)
+        return self._replace_fields(name=name)
 
     def with_colors(self, colors: Mapping[str, Color]) -> PlanningScene:
         """Returns the scene with additional colours of objects (r, g, b, a in 0..1)."""
-        return self._changed(colors={**self.colors, **colors})
+        return self._replace_fields(colors={**self.colors, **colors})
 
     def with_fixed_frames(self, frames: Mapping[str, Transform]) -> PlanningScene:
         """Returns the scene with additional named frames, given in the planning frame."""
-        return self._changed(fixed_frames={**self.fixed_frames, **frames}) if frames else self
+        return self._replace_fields(fixed_frames={**self.fixed_frames, **frames}) if frames else self
 
     def with_padding(self, padding: Padding) -> PlanningScene:
         """Returns the scene with a new padding; raises UnknownNameError for an unknown link."""
@@ -110,7 +110,7 @@ class PlanningScene:
                 raise UnknownNameError(
                     ErrorCode.INVALID_LINK_NAME, "link padding and scale: link", link, self.model.frame_ids
                 )
-        return self._changed(padding=padding)
+        return self._replace_fields(padding=padding)
 
     def with_octomap(self, octree: Octree | None, pose: Transform = None) -> PlanningScene:
         """Returns the scene with a new octomap.
@@ -120,11 +120,11 @@ class PlanningScene:
             pose: Pose of the octomap's origin in the planning frame; None for identity.
         """
         if octree is None:
-            return self._changed(octomap=None)
+            return self._replace_fields(octomap=None)
         from pinocchio import SE3
 
         body = CollisionObject(OCTOMAP_ID, SE3.Identity() if pose is None else pose, ((octree, SE3.Identity()),))
-        return self._changed(octomap=body)
+        return self._replace_fields(octomap=body)
 
     def obstacles(self) -> tuple[CollisionObject, ...]:
         """Returns all world objects, and the octomap if a voxel is occupied."""
@@ -155,7 +155,7 @@ class PlanningScene:
             raise GeometryError(f"collision object '{body.name}': no shape; add at least one shape")
         if self.model.has_link(body.name):
             raise GeometryError(f"collision object '{body.name}': a link of the robot has this name; use another id")
-        return self._changed(
+        return self._replace_fields(
             objects={**self.objects, body.name: body},
             attached={key: value for key, value in self.attached.items() if key != body.name},
         )
@@ -169,7 +169,9 @@ class PlanningScene:
         added = [(shape, new_in_old * pose) for shape, pose in body.shapes]
         shapes = tuple(sorted((*old.shapes, *added), key=lambda item: _message_order(item[0])))
         subframes = {**old.subframes, **{name: new_in_old * pose for name, pose in body.subframes.items()}}
-        return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)})
+        return self._replace_fields(
+            objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)}
+        )
 
     def with_object_moved(self, name: str, pose: Transform, shape_poses: Sequence[Transform] = ()) -> PlanningScene:
         """Moves an object.
@@ -192,7 +194,7 @@ class PlanningScene:
                     "give one pose per shape, or none to move the whole object"
                 )
             shapes = tuple((shape, shape_pose) for (shape, _), shape_pose in zip(shapes, shape_poses, strict=True))
-        return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
+        return self._replace_fields(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
 
     def without_object(self, name: str) -> PlanningScene:
         """Removes an object and its colour from the world; raises UnknownNameError."""
@@ -210,7 +212,7 @@ class PlanningScene:
             changes[kind] = {key: value for key, value in getattr(self, kind).items() if key not in removed}
             if self.colors.keys() & removed:
                 changes["colors"] = {key: value for key, value in self.colors.items() if key not in removed}
-        return self._changed(**changes)
+        return self._replace_fields(**changes)
 
     def find_object(self, name: str) -> CollisionObject:
         """Returns an object of the world; raises UnknownNameError."""
@@ -234,7 +236,7 @@ class PlanningScene:
             raise GeometryError(
                 f"attached object '{item.name}': no shape, and no world object has this name; add a shape"
             )
-        return self._changed(
+        return self._replace_fields(
             attached={**self.attached, item.name: item},
             objects={key: value for key, value in self.objects.items() if key != item.name},
         )
@@ -245,7 +247,7 @@ class PlanningScene:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "attached object", name, self.attached)
         body = replace(self.attached[name].body, pose=self.attached_pose(name))
         rest = {key: value for key, value in self.attached.items() if key != name}
-        return self._changed(attached=rest, objects={**self.objects, name: body})
+        return self._replace_fields(attached=rest, objects={**self.objects, name: body})
 
     def without_attached(self, names: Iterable[str]) -> PlanningScene:
         """Deletes attached bodies and their colours."""

@@ -105,7 +105,9 @@ class RobotModel:
             [self.index[name] for name in self.base.variables] if self.base else [], dtype=np.int64
         )
         self.passive_joints = frozenset(self.semantics.passive_joints) - self.document.mimics.keys()
-        self.follower_joints = frozenset(self._expanded((*self.document.mimics, *self.semantics.passive_joints)))
+        self.follower_joints = frozenset(
+            self._with_base_variables((*self.document.mimics, *self.semantics.passive_joints))
+        )
         # As in MoveIt: the parent frame of a moving base, or the root link. tf provides the parent frame of a fixed
         # virtual joint.
         self.planning_frame = self.base.parent_frame if self.base else self.document.root_link
@@ -130,7 +132,7 @@ class RobotModel:
         except GroupError as error:
             raise ModelError(str(error)) from error
 
-    def _expanded(self, joints: Iterable[str]) -> set[str]:
+    def _with_base_variables(self, joints: Iterable[str]) -> set[str]:
         """Returns joint names, with the base or any of its variables replaced by all its variables."""
         names = set(joints)
         if self.base and names & {self.base.name, *self.base.variables}:
@@ -180,7 +182,7 @@ class RobotModel:
         return [self.pin_model.names[index] for index in self.pin_model.supports[joint]]
 
     def _group_joints(self, spec: GroupSpec) -> set[str]:
-        return self._expanded(self.tree.group_joints(spec.name, self.semantics))
+        return self._with_base_variables(self.tree.group_joints(spec.name, self.semantics))
 
     def _build_group(self, spec: GroupSpec) -> JointGroup:
         members = self._group_joints(spec)

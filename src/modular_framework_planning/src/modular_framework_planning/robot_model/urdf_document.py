@@ -141,7 +141,7 @@ def _xml_for_pinocchio(text: str, base: Sequence[Variable]) -> str:
     return xml_text.to_text(root)
 
 
-def _placed(items: tuple[PlacedShapes, ...]) -> Iterator[tuple[urdf.Shape, Transform]]:
+def _placed_shapes(items: tuple[PlacedShapes, ...]) -> Iterator[tuple[urdf.Shape, Transform]]:
     """Yields the shapes of visual or collision elements and their poses in the link frame."""
     for item in items:
         pose = pin.SE3(pin.rpy.rpyToMatrix(*item.origin.rpy), np.array(item.origin.xyz))
@@ -150,13 +150,13 @@ def _placed(items: tuple[PlacedShapes, ...]) -> Iterator[tuple[urdf.Shape, Trans
 
 
 def _visual_meshes(link: Link) -> Iterator[VisualMesh]:
-    for shape, pose in _placed(link.visuals):
+    for shape, pose in _placed_shapes(link.visuals):
         if isinstance(shape, urdf.MeshFile):
             yield shape.uri, pose, shape.scale
 
 
 def _visual_shapes(link: Link) -> Iterator[PlacedShape]:
-    for shape, pose in _placed(link.visuals):
+    for shape, pose in _placed_shapes(link.visuals):
         primitive = (
             None if isinstance(shape, urdf.Capsule) else _primitive(shape)
         )  # there is no marker type for a capsule
@@ -180,7 +180,7 @@ def _primitive(shape: urdf.Shape) -> Shape | None:
 def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
     """Yields the collision shapes of a link; raises ModelError for an unreadable mesh or an unknown shape."""
     where = f"URDF link '{link.name}' collision"
-    for shape, pose in _placed(link.collisions):
+    for shape, pose in _placed_shapes(link.collisions):
         if isinstance(shape, urdf.UnknownShape):
             raise ModelError(f"{where}: <{shape.tag}>; allowed: box, capsule, cylinder, sphere and mesh")
         try:

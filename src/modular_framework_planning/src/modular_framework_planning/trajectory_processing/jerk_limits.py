@@ -10,7 +10,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.time_parameterization import (
     MARGIN,
-    joined,
+    join_trajectories,
     point_times,
     required_slowdown,
 )
@@ -55,7 +55,7 @@ def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Arra
         jerk: Limits (n,) [rad/s^3 or m/s^3].
     """
     usable = 1.0 - MARGIN
-    return trajectory.slowed(
+    return trajectory.with_slowdown(
         required_jerk_slowdown(trajectory, velocity * usable, acceleration * usable, jerk * usable)
     )
 
@@ -116,7 +116,7 @@ def along_straight_lines(
         )
         for start, end in zip(distinct[:-1], distinct[1:], strict=True)
     ]
-    return joined(parts)
+    return join_trajectories(parts)
 
 
 def _integrals(trajectory: Trajectory, times: Array) -> Array:
@@ -151,7 +151,7 @@ def averaged_curve(trajectory: Trajectory, velocity: Array, acceleration: Array,
     window = float((2.0 * max_acceleration / jerk).max())
     deviation = float(max_acceleration.max()) * window * window / 24.0
     factor = max(1.0, (deviation / MAX_DEVIATION) ** (1.0 / 6.0))
-    slower = trajectory.slowed(factor)
+    slower = trajectory.with_slowdown(factor)
     window = max(window / factor**2, 1e-3)
     times = point_times(np.array([window]), slower.duration_s + window)
     before, after = slower.sample(times - window), slower.sample(times)

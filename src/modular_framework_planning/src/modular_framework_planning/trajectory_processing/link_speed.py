@@ -131,4 +131,4 @@ def with_limited_link_speed(
     slowed = _slowed_smoothly(trajectory, times, slowing)
     excess = float(frame_speeds(moved, slowed, slowed.sample_times()).max()) / speed_limit
     factor = max(excess, required_slowdown(slowed, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
-    return slowed.slowed(max(factor, 1.0))
+    return slowed.with_slowdown(max(factor, 1.0))

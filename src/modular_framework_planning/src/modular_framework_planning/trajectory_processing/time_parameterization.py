@@ -106,10 +106,10 @@ def parameterize(
     )
     periods = WINDOW_S, float(max_period_s), MIN_PERIOD_S
     parts = [timed_points(*section, velocity, acceleration, *periods) for section in _sections(vertices, blends)]
-    return joined([Trajectory(joint_names, times, *values) for times, values in parts])
+    return join_trajectories([Trajectory(joint_names, times, *values) for times, values in parts])
 
 
-def joined(parts: Sequence[Trajectory]) -> Trajectory:
+def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
     """Returns the concatenation of trajectories that start and end at rest."""
     ends = np.cumsum([0.0, *(part.duration_s for part in parts)])
     times = np.concatenate(
@@ -130,5 +130,5 @@ def warm_up() -> None:
     motion.chords()
     motion.curve(0.1)
     point_times(motion.times, motion.duration_s)
-    required_slowdown(motion.slowed(2.0), limits, limits)
+    required_slowdown(motion.with_slowdown(2.0), limits, limits)
     free_blends(vertices, max_blends(vertices, 0.1), lambda samples: len(samples) > 0)

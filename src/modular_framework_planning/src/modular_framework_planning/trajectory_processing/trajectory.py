@@ -102,7 +102,7 @@ class Trajectory:
         runs = np.split(bent, np.flatnonzero(np.diff(bent) > 1) + 1) if len(bent) else []
         return [self.positions[run[0] : run[-1] + 2] for run in runs]
 
-    def slowed(self, factor: float) -> Trajectory:
+    def with_slowdown(self, factor: float) -> Trajectory:
         """Returns the trajectory slowed by a factor; times are rounded to whole nanoseconds, as in messages."""
         times = np.round(self.times * factor, 9)
         positions, velocities, accelerations, _ = self.sample(times / factor)

@@ -88,11 +88,11 @@ class GoalMarker:
                 handles[handle] = entry
                 self._menu.setCheckState(handle, MenuHandler.CHECKED if index == 0 else MenuHandler.UNCHECKED)
 
-        for name in self._shown():
+        for name in self._shown_controls():
             self._menu.apply(self._server, name)
         self._server.applyChanges()
 
-    def _shown(self) -> list[str]:
+    def _shown_controls(self) -> list[str]:
         return [name for name in (GOAL, BASE) if self._server.get(name) is not None]
 
     def _selector(self, choice: Choice, handles: dict[int, str]) -> Callable[[Any], None]:
@@ -140,7 +140,7 @@ class GoalMarker:
 
     def move(self, name: str, pose: Pose) -> None:
         """Moves a marker at the next `apply`; has no effect on a hidden marker."""
-        if name in self._shown():
+        if name in self._shown_controls():
             self._server.setPose(name, pose)
 
     def apply(self) -> None:

@@ -21,7 +21,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.conversions import joint_values, state_message
 from modular_framework_planning.messages.multi_dof import goal_values, with_multi_dof
 from modular_framework_planning.messages.poses import pose_message, transform_from_pose
-from modular_framework_planning.move_group.markers.scene_markers import numbered, robot_markers
+from modular_framework_planning.move_group.markers.scene_markers import marker_array_message, robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.multi_dof_joint import PLANAR
@@ -161,16 +161,16 @@ class InteractiveGoal:
 
     def set_goal_to_current(self) -> None:
         """Sets the goal to the current state."""
-        self._guarded(lambda: self._set_goal_state(self._client.state()))
+        self._run_guarded(lambda: self._set_goal_state(self._client.state()))
 
     def set_start_to_current(self) -> None:
         """Fixes the start at the current state, even if the robot moves later."""
-        self._guarded(lambda: self._set_start_state(self._client.state()))
+        self._run_guarded(lambda: self._set_start_state(self._client.state()))
 
     def follow_robot(self) -> None:
         """Makes motions start at the current state of the robot."""
         self._start = None
-        publish(self._ghosts["start"], numbered([], self._model.planning_frame))
+        publish(self._ghosts["start"], marker_array_message([], self._model.planning_frame))
 
     def _choose_planner(self, entry: str) -> None:
         pipeline, _, planner = entry.rpartition(": ")
@@ -182,7 +182,7 @@ class InteractiveGoal:
     def _choose_group(self, name: str) -> None:
         self._group, self._trajectory = self._model.group(name), None
         self._options = replace(self._options, pipeline_id="", planner_id="")
-        self._guarded(self._fill_menu)
+        self._run_guarded(self._fill_menu)
         self._show_markers()
         self._set_status(f"group: {name}")
 
@@ -195,13 +195,13 @@ class InteractiveGoal:
         def run() -> None:
             try:
                 self._set_status(f"{activity} ...")
-                self._guarded(job)
+                self._run_guarded(job)
             finally:
                 self._job.release()
 
         threading.Thread(target=run, daemon=True).start()
 
-    def _guarded(self, job: Callable[[], Any]) -> None:
+    def _run_guarded(self, job: Callable[[], Any]) -> None:
         try:
             job()
         except PlanningError as error:
@@ -281,11 +281,11 @@ class InteractiveGoal:
                 drag, self._dragged = self._dragged, None
                 self._solving = drag is not None
             if not self._goal_is_set:
-                self._guarded(self._follow_with_goal)
+                self._run_guarded(self._follow_with_goal)
             if drag is not None:
                 marker, pose = drag
                 handler = self._place_base if marker == BASE else self._solve
-                self._guarded(lambda run=handler, target=pose: run(target))
+                self._run_guarded(lambda run=handler, target=pose: run(target))
                 with self._drag_changed:
                     self._solving = False
                     self._drag_changed.notify_all()
@@ -323,7 +323,7 @@ class InteractiveGoal:
         self._move_markers()
 
     def _on_state(self, message: RobotState, setter: Callable[[RobotState], None]) -> None:
-        self._guarded(lambda: setter(message))
+        self._run_guarded(lambda: setter(message))
 
     def _set_goal_state(self, state: RobotState) -> None:
         positions = self._positions_of(state)
@@ -335,7 +335,7 @@ class InteractiveGoal:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
         ghost = robot_markers(self._model, positions, "start", START_COLOR)
-        publish(self._ghosts["start"], numbered(ghost, self._model.planning_frame))
+        publish(self._ghosts["start"], marker_array_message(ghost, self._model.planning_frame))
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
         with self._goal_changing:
@@ -363,7 +363,10 @@ class InteractiveGoal:
         text.pose.position.z += TEXT_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
-        publish(self._ghosts["goal"], numbered([*markers, text] if text.text else markers, self._model.planning_frame))
+        publish(
+            self._ghosts["goal"],
+            marker_array_message([*markers, text] if text.text else markers, self._model.planning_frame),
+        )
 
     # ---------------------------------------------------------------- states
     def _tip_pose(self) -> Pose:

@@ -201,7 +201,7 @@ def violations(
     if constraints is not None:
         for row in positions:
             rest[indices] = row
-            if not constraints.satisfied(rest):
+            if not constraints.are_satisfied(rest):
                 faults.append(f"path constraint: {constraints.describe(rest)}")
                 break
     checker.set_world(problem.world)

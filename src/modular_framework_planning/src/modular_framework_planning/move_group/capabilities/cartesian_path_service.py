@@ -78,7 +78,7 @@ class CartesianPathService(ServiceCapability):
                 objection=self._objection(lines, request),
                 carried=lines.offset,
             )
-            trajectory = self._timed(lines, path, request)
+            trajectory = self._timed_trajectory(lines, path, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
             return response
@@ -133,13 +133,13 @@ class CartesianPathService(ServiceCapability):
             collides = collision_objection(lines.checker, lines.motion, self._context.pipeline("").settings.motion_step)
 
         def objection(before: Array, after: Array) -> str:
-            if not constraints.is_empty and not constraints.satisfied(lines.motion.full_positions(after)):
+            if not constraints.is_empty and not constraints.are_satisfied(lines.motion.full_positions(after)):
                 return f"path_constraints: {constraints.describe(lines.motion.full_positions(after))}"
             return collides(before, after)
 
         return objection
 
-    def _timed(self, lines: _Lines, path: StraightLine, request: Any) -> Trajectory:
+    def _timed_trajectory(self, lines: _Lines, path: StraightLine, request: Any) -> Trajectory:
         model, indices = lines.scene.model, lines.group.indices
         velocity, acceleration = model.max_velocity[indices], model.max_acceleration[indices]
         step = self._context.pipeline("").settings.motion_step

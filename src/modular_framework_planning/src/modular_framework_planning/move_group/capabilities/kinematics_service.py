@@ -91,7 +91,7 @@ class KinematicsService(MoveGroupCapability):
         )
         timeout_s = search_time_s(request.timeout.to_sec())
         solutions = combined_solutions(targets, solvers, scene.positions, timeout_s)
-        valid = [positions for positions in solutions if constraints.satisfied(positions)]
+        valid = [positions for positions in solutions if constraints.are_satisfied(positions)]
         if valid and not request.avoid_collisions:
             return valid[0]
         checker = self._context.new_checker(scene, group.indices) if request.avoid_collisions else None

@@ -63,7 +63,7 @@ class QueryPlannersService(MoveGroupCapability):
 
     def _set(self, request: Any) -> SetPlannerParamsResponse:
         try:
-            pipeline = self._named(request)
+            pipeline = self._requested_pipeline(request)
             if len(request.params.keys) != len(request.params.values):
                 raise PlanningError(
                     ErrorCode.FAILURE,
@@ -78,7 +78,7 @@ class QueryPlannersService(MoveGroupCapability):
             rospy.logwarn("set_planner_params, %s: %s", request.planner_config, fault)
         return SetPlannerParamsResponse()
 
-    def _named(self, request: Any) -> PlanningPipeline:
+    def _requested_pipeline(self, request: Any) -> PlanningPipeline:
         """Returns the pipeline; raises PlanningError for a pipeline or group that does not exist."""
         if request.group:
             self._context.model.group(request.group)

@@ -144,7 +144,7 @@ class TrajectoryExecution:
         """Returns a description of the controllers for the log."""
         return "no execution of motions" if self.manager is None else self.manager.describe()
 
-    def others(self, path: PathWatch) -> list[PathWatch]:
+    def other_paths(self, path: PathWatch) -> list[PathWatch]:
         """Returns the paths of all other running motions."""
         with self._ended:
             paths = [motion.path for motion in self._motions if motion.admitted.is_set()]
@@ -184,9 +184,9 @@ class TrajectoryExecution:
         if not trajectory.joint_trajectory.points:
             return
         motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
-        parts = self._parts(motion, self.manager)
+        parts = self._motion_parts(motion, self.manager)
         joints = frozenset(joint for part in parts for joint in part.controller.joints)
-        with self._registered(_Motion(joints, path), admit) as stop:
+        with self._registered_motion(_Motion(joints, path), admit) as stop:
             self._check_start(motion)
             if self._is_there_already(motion, parts):
                 return
@@ -198,7 +198,7 @@ class TrajectoryExecution:
                     self._settle(motion.joint_names)
 
     @contextmanager
-    def _registered(self, new_motion: _Motion, admit: Admission) -> Iterator[threading.Event]:
+    def _registered_motion(self, new_motion: _Motion, admit: Admission) -> Iterator[threading.Event]:
         """Registers a motion and yields the event that stops the motion.
 
         Raises:
@@ -222,7 +222,7 @@ class TrajectoryExecution:
                 self._motions.remove(new_motion)
                 self._ended.notify_all()
 
-    def _parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
+    def _motion_parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
         followers = self._monitor.model.follower_joints
         joints = [joint for joint in motion.joint_names if joint not in followers]
         return split(

@@ -93,7 +93,7 @@ class MarkerPublisher:
         end[group.indices] = rows[-1]
         hand = _hand_links(model, group, answer.start, end)
         ghost = robot_markers(model, end, "ghost", (*GHOST_COLOR, GHOST_ALPHA), hand)
-        return numbered([*line, *ghost], self._frame)
+        return marker_array_message([*line, *ghost], self._frame)
 
     @contextmanager
     def shown_motion(self, scene: PlanningScene, joints: Sequence[str], rows: Array) -> Iterator[None]:
@@ -120,7 +120,7 @@ class MarkerPublisher:
         with self._motions_changing:
             self._motions = [other for other in self._motions if other is not line] + ([line] if begins else [])
             markers = [marker for other in self._motions for marker in other]
-            self._path.show(lambda: numbered(markers, self._frame))
+            self._path.show(lambda: marker_array_message(markers, self._frame))
 
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
         """Replaces the shown contacts by spheres, whose namespaces name the two bodies."""
@@ -221,7 +221,7 @@ def delete_all(frame: str) -> Marker:
     return marker
 
 
-def numbered(markers: Sequence[Marker], frame: str) -> MarkerArray:
+def marker_array_message(markers: Sequence[Marker], frame: str) -> MarkerArray:
     """Returns the message that replaces all markers of a topic by these markers; `frame` is any known frame."""
     for index, marker in enumerate(markers):
         marker.id = index

@@ -170,7 +170,7 @@ class OctomapMonitor:
             newest = voxels_of(now)
             if newest is None or newest.resolution != resolution or now.octomap is None:
                 return now
-            return now.with_octomap(Octree(newest.freed(keys)), now.octomap.pose)
+            return now.with_octomap(Octree(newest.with_free_cells(keys)), now.octomap.pose)
 
         self._monitor.apply(change)
 

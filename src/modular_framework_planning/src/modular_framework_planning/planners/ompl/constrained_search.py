@@ -26,7 +26,7 @@ def constraints_are_tight(problem: PlanningProblem) -> bool:
         return False
     low, high = problem.search_bounds(problem.start_values[None])
     states = problem.rng.uniform(low, high, (TIGHTNESS_SAMPLES, len(low)))
-    satisfying = sum(constraints.satisfied(state) for state in problem.motion.full_path(states))
+    satisfying = sum(constraints.are_satisfied(state) for state in problem.motion.full_path(states))
     return satisfying < TIGHT_FRACTION * TIGHTNESS_SAMPLES
 
 

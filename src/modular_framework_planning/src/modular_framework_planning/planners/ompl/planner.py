@@ -35,7 +35,7 @@ from modular_framework_planning.planners.rrt_connect.rrt_connect import (
     TreeGrowth,
     can_search,
 )
-from modular_framework_planning.planning_interface.path_repair import repaired
+from modular_framework_planning.planning_interface.path_repair import repair_path
 from modular_framework_planning.planning_interface.planner_interface import (
     PlannedPath,
     Planner,
@@ -99,13 +99,13 @@ class OmplPlanner(Planner):
                 return PlannedPath(min(paths, key=path_length))
         raise no_path(problem, problem.planner_id, total_checks)
 
-    def repaired(self, problem: PlanningProblem, vertices: Array) -> Array:
+    def repair_path(self, problem: PlanningProblem, vertices: Array) -> Array:
         """Returns the path with invalid edges replaced by detours, valid at the step of the final validation.
 
         Raises:
             EdgeError: An edge could not be repaired.
         """
-        return repaired(problem, vertices, connection)
+        return repair_path(problem, vertices, connection)
 
 
 def _stages(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProblem, Array]]:

@@ -164,7 +164,7 @@ def blend(
         _part(middle, np.ones(len(middle.times), dtype=bool), entry_s),
         _part(second, second.times > exit_s + MIN_GAP_S, entry_s + blend_s - exit_s),
     ]
-    return concatenated(parts), middle
+    return concatenate_trajectories(parts), middle
 
 
 def _part(trajectory: Trajectory, mask: NDArray[np.bool_], shift_s: float) -> Trajectory:
@@ -177,7 +177,7 @@ def _part(trajectory: Trajectory, mask: NDArray[np.bool_], shift_s: float) -> Tr
     )
 
 
-def concatenated(parts: list[Trajectory]) -> Trajectory:
+def concatenate_trajectories(parts: list[Trajectory]) -> Trajectory:
     """Joins pieces with consecutive times, rounded to whole nanoseconds."""
     times = np.round(np.concatenate([part.times for part in parts]), 9)
     return Trajectory(
@@ -190,7 +190,7 @@ def concatenated(parts: list[Trajectory]) -> Trajectory:
     )
 
 
-def appended(first: Trajectory, second: Trajectory) -> Trajectory:
+def append_trajectory(first: Trajectory, second: Trajectory) -> Trajectory:
     """Returns the first trajectory followed by the second, with a stop in between."""
     mask = np.arange(len(second.times)) > 0
-    return concatenated([first, _part(second, mask, first.duration_s)])
+    return concatenate_trajectories([first, _part(second, mask, first.duration_s)])

@@ -12,7 +12,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits
 from modular_framework_planning.planners.pilz.joint_motion import JointRateLimits, JointState, Posture, at_rest, follow
-from modular_framework_planning.planners.pilz.pose_path import PosePath, TimedPath, timed
+from modular_framework_planning.planners.pilz.pose_path import PosePath, TimedPath, time_pose_path
 from modular_framework_planning.planners.pilz.velocity_profile import fastest_profile, sample_times
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
@@ -91,7 +91,7 @@ def along_path(
         PlanningError: A pose cannot be reached without a jump, a joint limit is exceeded, or the final posture
             differs from the goal.
     """
-    motion = timed(path, limits, settings.velocity_scaling, settings.acceleration_scaling)
+    motion = time_pose_path(path, limits, settings.velocity_scaling, settings.acceleration_scaling)
     if motion is None:
         trajectory = standstill(follower.group.joints, start)
     else:

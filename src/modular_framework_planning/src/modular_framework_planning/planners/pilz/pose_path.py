@@ -18,7 +18,7 @@ MIN_RADIUS = 1.0e-4  # [m]
 MIN_SINE = 1.0e-3  # minimum sine of the angle between two directions that span a plane
 
 
-def _rotated(start: Transform, rotation_vector: Array, fraction: float) -> Array:
+def _rotated_orientation(start: Transform, rotation_vector: Array, fraction: float) -> Array:
     return start.rotation @ pin.exp3(fraction * rotation_vector)
 
 
@@ -48,7 +48,7 @@ class LinePath:
     def pose(self, fraction: float) -> Transform:
         """Returns the link pose in the planning frame."""
         return pin.SE3(
-            _rotated(self.start, self.rotation_vector, fraction),
+            _rotated_orientation(self.start, self.rotation_vector, fraction),
             self.start.translation + fraction * (self.end.translation - self.start.translation),
         )
 
@@ -86,7 +86,7 @@ class ArcPath:
         radius = self.start_radius + fraction * (self.end_radius - self.start_radius)
         angle = fraction * self.angle
         point = self.centre + radius * (np.cos(angle) * self.first + np.sin(angle) * self.second)
-        return pin.SE3(_rotated(self.start, self.rotation_vector, fraction), point)
+        return pin.SE3(_rotated_orientation(self.start, self.rotation_vector, fraction), point)
 
 
 PosePath = LinePath | ArcPath
@@ -208,7 +208,7 @@ class TimedPath:
         return self.path.pose(float(position) / self.profile.distance)
 
 
-def timed(
+def time_pose_path(
     path: PosePath, limits: CartesianLimits, velocity_scaling: float, acceleration_scaling: float
 ) -> TimedPath | None:
     """Returns a path with the fastest velocity profile within scaled Cartesian limits, None for an empty path.

@@ -17,7 +17,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
-from modular_framework_planning.planners.pilz.blending import appended, blend
+from modular_framework_planning.planners.pilz.blending import append_trajectory, blend
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import PlanningRequest, PlanningResult
@@ -142,9 +142,9 @@ class SequenceJoiner:
             radius = items[index - 1].blend_radius
             try:
                 trajectory = (
-                    self._blended(previous, items[index - 1], item, radius)
+                    self._blended_trajectory(previous, items[index - 1], item, radius)
                     if radius > 0.0
-                    else appended(previous.trajectory, item.answer.trajectory)
+                    else append_trajectory(previous.trajectory, item.answer.trajectory)
                 )
             except PlanningError as error:
                 raise PlanningError(error.code, f"items[{index - 1}] and items[{index}]: {error.reason}") from error
@@ -173,7 +173,9 @@ class SequenceJoiner:
                     f"radii must be below the distance {distance:.4f} m between the ends of the motions",
                 )
 
-    def _blended(self, previous: SequencePart, item: PlannedItem, next_item: PlannedItem, radius: float) -> Trajectory:
+    def _blended_trajectory(
+        self, previous: SequencePart, item: PlannedItem, next_item: PlannedItem, radius: float
+    ) -> Trajectory:
         trajectory, blended = blend(
             previous.trajectory, next_item.answer.trajectory, radius, self._follower(item), self._period_s
         )
@@ -187,7 +189,7 @@ class SequenceJoiner:
             raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blend with radius {radius} m: {contacts}")
         for constraints in (item.request.path_constraints, next_item.request.path_constraints):
             for values in curve if constraints is not None else ():
-                if constraints is not None and not constraints.satisfied(motion.full_positions(values)):
+                if constraints is not None and not constraints.are_satisfied(motion.full_positions(values)):
                     raise PlanningError(
                         ErrorCode.INVALID_MOTION_PLAN,
                         f"blend with radius {radius} m: a path constraint "

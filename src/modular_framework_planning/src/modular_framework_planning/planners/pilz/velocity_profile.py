@@ -80,10 +80,10 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
     knots = np.unique(np.concatenate([breakpoints, breakpoints + ROUNDING_S]))
     knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
 
-    def speed(times: Array) -> Array:
+    def speed_at(times: Array) -> Array:
         return np.interp(times, breakpoints, [0.0, peak, peak, 0.0], left=0.0, right=0.0)
 
-    accelerations = (speed(knots) - speed(knots - ROUNDING_S)) / ROUNDING_S
+    accelerations = (speed_at(knots) - speed_at(knots - ROUNDING_S)) / ROUNDING_S
     accelerations[-1] = 0.0
     gaps = np.diff(knots)
     velocities = np.concatenate([[0.0], np.cumsum(0.5 * gaps * (accelerations[:-1] + accelerations[1:]))])

@@ -18,7 +18,7 @@ import numpy as np
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, TreeGrowth
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
-from modular_framework_planning.planning_interface.problem_shortening import shortened
+from modular_framework_planning.planning_interface.problem_shortening import shorten_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 BOUND_FACTOR = 0.995  # length bound of a search, as a fraction of the best path so far
@@ -67,7 +67,7 @@ class Aorrtc:
                 self._remaining_extensions -= search.extensions
             if path is None:
                 break
-            best = shortened(problem, path, math.inf if problem.repeatable else problem.deadline_s, problem.rng)
+            best = shorten_path(problem, path, math.inf if problem.repeatable else problem.deadline_s, problem.rng)
             bound = BOUND_FACTOR * path_length(best)
         if problem.repeatable and problem.interrupted():
             return None  # a search stopped by the clock is not repeatable

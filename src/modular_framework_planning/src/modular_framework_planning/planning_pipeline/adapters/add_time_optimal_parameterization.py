@@ -42,18 +42,18 @@ class AddTimeOptimalParameterization(RequestAdapter):
 
 def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     """Returns the path with a trajectory; raises PlanningError for an invalid limit or parameter."""
-    with problem.phases.measured(TIMING):
-        return _timed(problem, path)
+    with problem.phases.measure(TIMING):
+        return _parameterized_path(problem, path)
 
 
-def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
+def _parameterized_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     vertices = np.ascontiguousarray(path.vertices, dtype=float)
     differ = np.abs(np.diff(vertices, axis=0)).max(axis=1) >= VERTEX_TOLERANCE
     vertices = vertices[np.append(differ, True)]  # keeps the last of equal vertices, so that the goal is exact
     period = _number(problem.settings.parameters, "resample_dt", MAX_PERIOD_S, MIN_PERIOD_S)
     tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
 
-    def timed(blends: Array, divisor: float = 1.0) -> PlannedPath:
+    def blended_path(blends: Array, divisor: float = 1.0) -> PlannedPath:
         return replace(
             path,
             trajectory=parameterize(
@@ -71,16 +71,16 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
         problem.constraints is None and path.path_prefix == 0
     )  # otherwise the validation would not cover all blends
     if tries_largest:  # most often, all blends are collision-free at their maximum size
-        rounded = timed(largest)
+        rounded = blended_path(largest)
         if not largest.any() or problem.solution_validator.is_valid(problem, rounded):
             return rounded
     blends = free_blends(vertices, largest, lambda curve: _blend_is_valid(problem, curve))
     if blends.any() and not (tries_largest and np.array_equal(blends, largest)):
         for divisor in (1.0,) if problem.constraints is None else ACCELERATION_DIVISORS:
-            rounded = timed(blends, divisor)
+            rounded = blended_path(blends, divisor)
             if problem.solution_validator.is_valid(problem, rounded):
                 return rounded
-    return timed(np.zeros_like(blends))
+    return blended_path(np.zeros_like(blends))
 
 
 def _blend_is_valid(problem: PlanningProblem, curve: Array) -> bool:

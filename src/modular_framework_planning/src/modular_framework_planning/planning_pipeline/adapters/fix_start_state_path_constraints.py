@@ -15,7 +15,7 @@ class FixStartStatePathConstraints(RequestAdapter):
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
         """Plans from the nearest state that satisfies the path constraints."""
         constraints = problem.constraints
-        if constraints is None or constraints.satisfied(problem.start):
+        if constraints is None or constraints.are_satisfied(problem.start):
             return plan_next(problem)
         indices = problem.group.indices
         nearest = constraints.project(problem.start, indices)

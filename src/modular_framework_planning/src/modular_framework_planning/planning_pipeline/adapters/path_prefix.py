@@ -34,10 +34,10 @@ def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool
     )
     if path.trajectory is None or np.abs(path.vertices[0] - start).max() < 1e-9:
         return result
-    return replace(result, trajectory=_joined(problem, start, path.trajectory))
+    return replace(result, trajectory=_with_prefix(problem, start, path.trajectory))
 
 
-def _joined(problem: PlanningProblem, start: Array, trajectory: Trajectory) -> Trajectory:
+def _with_prefix(problem: PlanningProblem, start: Array, trajectory: Trajectory) -> Trajectory:
     prefix = parameterize(
         problem.group.joints,
         np.vstack([start, trajectory.positions[0]]),
