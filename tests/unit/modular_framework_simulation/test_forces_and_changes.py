@@ -289,7 +289,7 @@ def test_a_link_that_is_put_somewhere_takes_its_model_along(space: PhysicsWorld)
     leaf = PartName("chain", "leaf")
     wanted = BodyState(Pose.from_xyz_rpy((2, 0, 3), (0.1, 0, 0.2)), Twist((0.1, 0, 0), (0, 0, 1.0)))
     set_link_state(space, leaf, wanted, "")
-    found = space.entity_state(leaf.scoped)
+    found = space.entity_state(leaf.scoped_name)
     assert found.pose.distance_to(wanted.pose)[0] < 1e-6
     assert found.twist.linear == pytest.approx((0.1, 0, 0), abs=1e-6)
     assert found.twist.angular == pytest.approx((0, 0, 1.0), abs=1e-6)

@@ -21,7 +21,7 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_testing.simulation.law_trials import TRIALS, heavy_on_light, stack
-from modular_framework_testing.simulation.simulated_samples import jointed, lift_robot_urdf, run, solid
+from modular_framework_testing.simulation.simulated_samples import hinged_model, lift_robot_urdf, run, solid
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))
@@ -59,7 +59,7 @@ def test_a_fall_is_that_of_galilei_within_the_step(make_world: MakeWorld, step_n
 def test_a_pendulum_swings_with_the_period_of_the_textbook(make_world: MakeWorld, step_ns: int) -> None:
     world = make_world(step_ns)
     length, amplitude = 0.4, 0.1
-    body = world.spawn(jointed("pendulum", length, pose=Pose((0, 0, 2))))
+    body = world.spawn(hinged_model("pendulum", length, pose=Pose((0, 0, 2))))
     body.set_joints({"hinge": math.pi / 2 - amplitude})
     before, crossings = -amplitude, []
     while len(crossings) < 3:
@@ -75,7 +75,7 @@ def test_a_pendulum_swings_with_the_period_of_the_textbook(make_world: MakeWorld
 
 
 def test_a_pendulum_keeps_its_swing_for_a_minute(world: PhysicsWorld) -> None:
-    body = world.spawn(jointed("pendulum", 0.4, pose=Pose((0, 0, 2))))
+    body = world.spawn(hinged_model("pendulum", 0.4, pose=Pose((0, 0, 2))))
     body.set_joints({"hinge": math.pi / 2 - 0.5})
     widest = 0.0
     for number in range(30_000):
@@ -202,7 +202,7 @@ def test_momentum_is_kept_in_a_collision(make_world: MakeWorld, bounce: float) -
 @pytest.mark.parametrize("damping", [0.0, 0.005, 0.05, 1.0, 1e4])
 def test_joint_damping_takes_the_velocity_exponentially_however_strong(make_world: MakeWorld, damping: float) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
-    world.spawn(jointed("wheel", 0.0, dynamics=specs.JointDynamics(damping=damping)))
+    world.spawn(hinged_model("wheel", 0.0, dynamics=specs.JointDynamics(damping=damping)))
     set_joint_velocity(world, "wheel", "hinge", 10.0)
     run(world, 0.1)
     rate = damping / 0.001
@@ -211,7 +211,7 @@ def test_joint_damping_takes_the_velocity_exponentially_however_strong(make_worl
 
 def test_joint_damping_is_right_on_a_base_with_moments_that_no_body_can_have(make_world: MakeWorld) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
-    model = jointed("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
+    model = hinged_model("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
     base = specs.Link("base", Pose(), specs.Inertial(Pose(), 100.0, (1, 0, 0, 100, 0, 1)), (), ())
     world.spawn(replace(model, links=(base, *model.links), joints=(replace(model.joints[0], parent="base"),)))
     set_joint_velocity(world, "wheel", "hinge", 10.0)
@@ -221,7 +221,7 @@ def test_joint_damping_is_right_on_a_base_with_moments_that_no_body_can_have(mak
 
 def test_a_joint_of_a_link_with_moments_that_no_body_can_have_is_damped(make_world: MakeWorld) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
-    model = jointed("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
+    model = hinged_model("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
     x, y, z = 1e-3, 1e-3, 4e-3
     odd = replace(model.links[-1], inertial=specs.Inertial(Pose(), 1.0, (x, 0, 0, y, 0, z)))
     world.spawn(replace(model, links=(*model.links[:-1], odd)))
@@ -232,7 +232,7 @@ def test_a_joint_of_a_link_with_moments_that_no_body_can_have_is_damped(make_wor
 
 def test_joint_friction_takes_the_same_from_the_velocity_every_second_and_holds(make_world: MakeWorld) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
-    world.spawn(jointed("wheel", 0.0, dynamics=specs.JointDynamics(friction=0.02)))
+    world.spawn(hinged_model("wheel", 0.0, dynamics=specs.JointDynamics(friction=0.02)))
     set_joint_velocity(world, "wheel", "hinge", 10.0)
     run(world, 0.3)
     assert joint_state(world, "wheel", "hinge")[1] == pytest.approx(10 - 0.02 / 0.001 * 0.3, rel=0.01)
@@ -245,7 +245,7 @@ def test_a_pendulum_is_held_by_enough_friction_and_by_no_less(make_world: MakeWo
     for share, held in ((1.05, True), (0.95, False)):
         world = make_world()
         dynamics = specs.JointDynamics(friction=share * weight)
-        world.spawn(jointed("arm", 0.4, dynamics=dynamics, pose=Pose((0, 0, 2))))
+        world.spawn(hinged_model("arm", 0.4, dynamics=dynamics, pose=Pose((0, 0, 2))))
         run(world, 1.0)
         assert (abs(joint_state(world, "arm", "hinge")[0]) < 1e-3) is held
 
@@ -254,7 +254,7 @@ def test_a_pendulum_is_held_by_enough_friction_and_by_no_less(make_world: MakeWo
 def test_a_spring_swings_with_its_period_about_its_reference(make_world: MakeWorld, stiffness: float) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
     dynamics = specs.JointDynamics(spring_reference=0.3, spring_stiffness=stiffness)
-    world.spawn(jointed("spring", 0.0, dynamics=dynamics))
+    world.spawn(hinged_model("spring", 0.0, dynamics=dynamics))
     period = 2 * math.pi * math.sqrt(0.001 / stiffness)
     angles = []
     for _ in range(round(10 * period / world.settings.time_step_s)):
@@ -268,7 +268,7 @@ def test_a_spring_swings_with_its_period_about_its_reference(make_world: MakeWor
 def test_a_spring_too_stiff_for_the_step_holds_its_joint(make_world: MakeWorld) -> None:
     world = make_world()
     dynamics = specs.JointDynamics(spring_reference=0.3, spring_stiffness=1e5)
-    world.spawn(jointed("stiff", 0.4, dynamics=dynamics, pose=Pose((0, 0, 2))))
+    world.spawn(hinged_model("stiff", 0.4, dynamics=dynamics, pose=Pose((0, 0, 2))))
     run(world, 2.0)
     assert joint_state(world, "stiff", "hinge")[0] == pytest.approx(0.3, abs=1e-3)
 
@@ -339,7 +339,7 @@ def set_joint_velocity(world: PhysicsWorld, model: str, joint: str, velocity: fl
 
 
 def test_a_model_with_a_ball_joint_has_damped_joints_and_springs_too(world: PhysicsWorld) -> None:
-    model = jointed("lamp", 0.4, specs.JointDynamics(0.01, 0.0, 0.3, 0.5), Pose((0, 0, 2)))
+    model = hinged_model("lamp", 0.4, specs.JointDynamics(0.01, 0.0, 0.3, 0.5), Pose((0, 0, 2)))
     bob = replace(model.links[0], name="shade", pose=Pose((0.6, 0, 0)))
     ball = specs.Joint(
         "ball", specs.JointType.BALL, "bob", "shade", pose=Pose((-0.2, 0, 0)), axis=(0, 0, 1), lower=0.0, upper=0.0

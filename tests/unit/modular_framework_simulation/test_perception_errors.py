@@ -33,7 +33,7 @@ def test_only_the_named_model_is_displaced_in_the_world_frame() -> None:
     errors.set("cube", (0.01, -0.02, 0.0))
     turned = Pose.from_xyz_rpy((0.5, 0.0, 0.1), (0.0, 0.0, 1.0))
     true = snapshot(turned)
-    perceived = errors.perceived(true)
+    perceived = errors.perceived_snapshot(true)
     assert cube_of(perceived) == Pose((0.51, -0.02, 0.1), turned.quaternion)
     assert perceived.models[1] == true.models[1]
     assert cube_of(true) == turned
@@ -43,14 +43,14 @@ def test_the_error_turns_with_the_hand_and_is_that_of_the_world_again_after_the_
     errors = PerceptionErrors()
     errors.set("cube", (0.01, 0.0, 0.0))
     hand = Pose.from_xyz_rpy((0.0, 0.0, 1.0), (math.pi, 0.0, 0.4))
-    at_grasp = errors.perceived(snapshot(hand, hand))
+    at_grasp = errors.perceived_snapshot(snapshot(hand, hand))
     assert cube_of(at_grasp).position == pytest.approx((0.01, 0.0, 1.0))
     turned = Pose.from_xyz_rpy((0.0, 0.3, 1.0), (math.pi, 0.0, 0.4 + math.pi / 2))
-    moved = errors.perceived(snapshot(turned, turned))
+    moved = errors.perceived_snapshot(snapshot(turned, turned))
     assert cube_of(moved).position == pytest.approx((0.0, 0.31, 1.0))
     in_hand = [pose.inverse() @ cube_of(world) for pose, world in ((hand, at_grasp), (turned, moved))]
     assert in_hand[0].distance_to(in_hand[1]) == pytest.approx((0.0, 0.0), abs=1e-7)
-    released = errors.perceived(snapshot(turned))
+    released = errors.perceived_snapshot(snapshot(turned))
     assert cube_of(released).position == pytest.approx((0.01, 0.3, 1.0))
 
 
@@ -63,4 +63,4 @@ def test_a_removed_error_leaves_the_true_snapshot(removal: str) -> None:
     else:
         errors.clear()
     true = snapshot(Pose())
-    assert errors.perceived(true) is true
+    assert errors.perceived_snapshot(true) is true

@@ -21,7 +21,13 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist
-from modular_framework_testing.simulation.simulated_samples import exact_state, jointed, lift_robot_urdf, run, solid
+from modular_framework_testing.simulation.simulated_samples import (
+    exact_state,
+    hinged_model,
+    lift_robot_urdf,
+    run,
+    solid,
+)
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))
@@ -93,7 +99,7 @@ def test_models_that_come_and_go_leave_the_motion_of_others_alone(make_world: Ma
         world = make_world()
         world.spawn(solid("stone", CUBE, Pose((0, 0, 3))))
         world.set_state("stone", BodyState(Pose((0, 0, 3)), Twist((0.5, 0.2, 1.0), (1.0, 2.0, 3.0))))
-        pendulum = world.spawn(jointed("pendulum", 0.4, pose=Pose((2, 0, 2))))
+        pendulum = world.spawn(hinged_model("pendulum", 0.4, pose=Pose((2, 0, 2))))
         pendulum.set_joints({"hinge": 0.3})
         for number in range(10):
             if busy:
@@ -118,7 +124,7 @@ def busy_world(make_world: MakeWorld) -> PhysicsWorld:
         world.spawn(
             solid(f"box_{number}", CUBE, Pose.from_xyz_rpy((0.01 * number, 0, 0.1 + 0.07 * number), (0.3, 0.2, 0)))
         )
-    world.spawn(jointed("pendulum", 0.4, specs.JointDynamics(0.01, 0.002, 0.1, 0.2), Pose((1, 0, 2))))
+    world.spawn(hinged_model("pendulum", 0.4, specs.JointDynamics(0.01, 0.002, 0.1, 0.2), Pose((1, 0, 2))))
     return world
 
 

@@ -40,7 +40,8 @@ class UnknownEntityError(SimulationError):
 
     def __init__(self, kind: str, name: str, known: list[str]) -> None:
         super().__init__(
-            f"there is no {kind} '{_shown(name)}' in the simulated world; known: {_listed(known)}{nearest(name, known)}"
+            f"there is no {kind} '{_short_name(name)}' in the simulated world; "
+            f"known: {_name_list(known)}{nearest(name, known)}"
         )
         self.kind = kind
         self.name = name
@@ -56,16 +57,18 @@ class AmbiguousNameError(SimulationError):
     """
 
     def __init__(self, kind: str, name: str, found: list[str]) -> None:
-        super().__init__(f"{len(found)} models have a {kind} '{_shown(name)}'; name the model too: {_listed(found)}")
+        super().__init__(
+            f"{len(found)} models have a {kind} '{_short_name(name)}'; name the model too: {_name_list(found)}"
+        )
         self.kind = kind
         self.name = name
 
 
-def _shown(name: str) -> str:
+def _short_name(name: str) -> str:
     return name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
 
 
-def _listed(names: list[str]) -> str:
+def _name_list(names: list[str]) -> str:
     shown = sorted(names)[:MAX_LISTED_NAMES]
     more = len(names) - len(shown)
     return (", ".join(shown) or "none") + (f" and {more} more" if more else "")

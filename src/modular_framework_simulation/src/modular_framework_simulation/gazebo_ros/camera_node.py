@@ -54,29 +54,29 @@ class CameraPublisher:
     @property
     def needs_image(self) -> bool:
         """Returns whether an image topic has a subscriber."""
-        return any(_subscribed(each) for each in (self._image, self._depth, self._points))
+        return any(_has_subscribers(each) for each in (self._image, self._depth, self._points))
 
     @property
     def has_subscribers(self) -> bool:
         """Returns whether any topic has a subscriber."""
-        return self.needs_image or any(_subscribed(each) for each in self._infos)
+        return self.needs_image or any(_has_subscribers(each) for each in self._infos)
 
     def publish(self, update: SceneUpdate, renderer: Renderer) -> None:
         """Renders an image, and publishes the topics with subscribers."""
         camera = self.camera
         message_header = camera_messages.header(camera.frame_id, update.time_ns)
         for info in self._infos:
-            if _subscribed(info):
+            if _has_subscribers(info):
                 info.publish(camera_messages.camera_info(camera.pinhole, message_header))
         if not self.needs_image:
             return
         image = renderer.image(camera.pinhole, update.cameras[camera.name]).within(camera.depth_range)
         image = image.with_noise(self._noise, update.time_ns)
-        if _subscribed(self._image):
+        if _has_subscribers(self._image):
             self._image.publish(camera_messages.rgb_image(image, message_header))
-        if _subscribed(self._depth):
+        if _has_subscribers(self._depth):
             self._depth.publish(camera_messages.depth_image(image, message_header))
-        if _subscribed(self._points):
+        if _has_subscribers(self._points):
             self._points.publish(camera_messages.point_cloud(camera.pinhole, image, message_header))
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ class _Counter(rospy.SubscribeListener):
         self._counted.subscriptions += 1
 
 
-def _subscribed(publisher: Any) -> bool:
+def _has_subscribers(publisher: Any) -> bool:
     return publisher is not None and publisher.get_num_connections() > 0
 
 

@@ -51,7 +51,7 @@ class LinkServices:
 
     def _get_state(self, request: Any) -> Any:
         link, reference = self._link(request.link_name), self._frame(request.reference_frame)
-        state = self._world.state_relative_to(link.scoped, reference)
+        state = self._world.state_relative_to(link.scoped_name, reference)
         response = srv.GetLinkStateResponse(success=True, status_message="read the state of the link")
         response.link_state.link_name = request.link_name
         response.link_state.pose = conversions.pose_to_msg(state.pose)
@@ -89,14 +89,14 @@ class LinkServices:
         changed = set_inertial(self._world, link, inertial, request.gravity_mode)
         mass = "new properties" if changed else "unchanged properties"
         weight = "gravity acts on it" if request.gravity_mode else "gravity does not act on it"
-        return srv.SetLinkPropertiesResponse(True, f"link '{link.scoped}': {mass}; {weight}")
+        return srv.SetLinkPropertiesResponse(True, f"link '{link.scoped_name}': {mass}; {weight}")
 
     def _require_movable(self, link: PartName) -> None:
         """Raises ModelChangeError for links that forces cannot move."""
         body = self._world.body(link.model)
         fixed_to_world = body.static and body.spec is not None
         if fixed_to_world or link_mass(self._world.engine, body, link.part) == 0.0:
-            raise ModelChangeError(f"link '{link.scoped}' is fixed to the world; forces do not move it")
+            raise ModelChangeError(f"link '{link.scoped_name}' is fixed to the world; forces do not move it")
 
     def _apply_wrench(self, request: Any) -> Any:
         link, reference = self._link(request.body_name), self._frame(request.reference_frame)
@@ -112,7 +112,7 @@ class LinkServices:
             return srv.ApplyBodyWrenchResponse(True, "the duration is 0: no force acts; use -1 for no end")
         interval = Interval.from_request(now_ns, request.start_time.to_nsec(), duration_ns)
         self._world.forces.add_wrench(LinkWrench(link, force, add(torque, cross(lever, force)), interval))
-        return srv.ApplyBodyWrenchResponse(True, f"the wrench acts on '{link.scoped}' {describe(interval)}")
+        return srv.ApplyBodyWrenchResponse(True, f"the wrench acts on '{link.scoped_name}' {describe(interval)}")
 
     def _in_world(
         self, link: PartName, reference: str, wrench: tuple[Vector3, Vector3, Vector3]

@@ -223,7 +223,7 @@ class PlanningScenePublisher:
             case Add(link=spec, pose_in_world=pose):
                 world.append(conversions.link_to_collision_object(model, spec, ros_names.WORLD_FRAME, pose))
             case Move(pose_in_world=pose):
-                world.append(_moved(identity, conversions.pose_to_msg(pose)))
+                world.append(_move_message(identity, conversions.pose_to_msg(pose)))
             case Remove():
                 world.append(CollisionObject(id=identity, operation=CollisionObject.REMOVE))
             case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose, touch_links=touch_links):
@@ -236,7 +236,7 @@ class PlanningScenePublisher:
                 attached.append(released)
 
 
-def _moved(identity: str, pose: PoseMsg) -> CollisionObject:
+def _move_message(identity: str, pose: PoseMsg) -> CollisionObject:
     message = CollisionObject(id=identity, operation=CollisionObject.MOVE, pose=pose)
     message.header.frame_id = ros_names.WORLD_FRAME
     return message

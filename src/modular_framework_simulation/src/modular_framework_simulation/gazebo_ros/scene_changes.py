@@ -168,7 +168,7 @@ class SceneChanges:
         if (
             previous is not None
             and previous.carrier_link == now.carrier_link
-            and not self._moved(previous.pose, now.pose)
+            and not self._has_moved(previous.pose, now.pose)
         ):
             return []
         carrier = self._attached.get(key) if previous is not None else None
@@ -183,7 +183,7 @@ class SceneChanges:
             return [Add(key, target.link, now.pose)]
         return [Move(key, now.pose)]
 
-    def _moved(self, previous: Pose, now: Pose) -> bool:
+    def _has_moved(self, previous: Pose, now: Pose) -> bool:
         if self._exact:
             return previous != now
         translation, rotation = previous.distance_to(now)

@@ -238,10 +238,10 @@ class SimulationNode:
 
     def _publish_snapshot(self) -> None:
         self._last_snapshot = take_snapshot(self._world, self._loop.held_objects(), self._last_snapshot)
-        self._scene.show(self._perception.perceived(self._last_snapshot))
+        self._scene.show(self._perception.perceived_snapshot(self._last_snapshot))
 
     def _snapshot(self) -> WorldSnapshot:
-        return self._perception.perceived(take_snapshot(self._world, self._loop.held_objects()))
+        return self._perception.perceived_snapshot(take_snapshot(self._world, self._loop.held_objects()))
 
     def _after_restart(self) -> None:
         self._loop.requests.call(RESTART, self._perception.clear, _RESPONSE_TIMEOUT_S)

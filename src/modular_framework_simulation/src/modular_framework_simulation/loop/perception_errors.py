@@ -44,18 +44,18 @@ class PerceptionErrors:
         self._errors.clear()
         self._errors_in_hand.clear()
 
-    def perceived(self, snapshot: WorldSnapshot) -> WorldSnapshot:
+    def perceived_snapshot(self, snapshot: WorldSnapshot) -> WorldSnapshot:
         """Returns the snapshot with displaced models; the true snapshot stays unchanged."""
         if not self._errors:
             return snapshot
         held = {each.model: each for each in snapshot.held}
         models = tuple(
-            self._displaced(model, held.get(model.name)) if model.name in self._errors else model
+            self._displaced_model(model, held.get(model.name)) if model.name in self._errors else model
             for model in snapshot.models
         )
         return dataclasses.replace(snapshot, models=models)
 
-    def _displaced(self, model: ModelSnapshot, held: HeldObject | None) -> ModelSnapshot:
+    def _displaced_model(self, model: ModelSnapshot, held: HeldObject | None) -> ModelSnapshot:
         error = self._errors[model.name]
         if held is None:
             self._errors_in_hand.pop(model.name, None)
@@ -65,9 +65,9 @@ class PerceptionErrors:
                 to_carrier = held.carrier_in_world.inverse().quaternion
                 self._errors_in_hand[model.name] = rotate_vector(to_carrier, error)
             error = rotate_vector(to_world, self._errors_in_hand[model.name])
-        return dataclasses.replace(model, links=tuple(_moved(link, error) for link in model.links))
+        return dataclasses.replace(model, links=tuple(_displaced_link(link, error) for link in model.links))
 
 
-def _moved(link: LinkSnapshot, displacement: Vector3) -> LinkSnapshot:
+def _displaced_link(link: LinkSnapshot, displacement: Vector3) -> LinkSnapshot:
     (x, y, z), (dx, dy, dz) = link.pose_in_world.position, displacement
     return LinkSnapshot(link.spec, Pose((x + dx, y + dy, z + dz), link.pose_in_world.quaternion))

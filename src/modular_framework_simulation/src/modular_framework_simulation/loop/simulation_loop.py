@@ -291,10 +291,10 @@ class SimulationLoop:
             return
         robot = self._actors.robot
         for gripper, watch in zip(robot.grippers, self.grasp_watches, strict=True):
-            watch.update(self._time_s(), [self._touched(robot, finger) for finger in gripper.fingers])
+            watch.update(self._time_s(), [self._touched_objects(robot, finger) for finger in gripper.fingers])
         self.world.carry(robot.body, [(held.model, held.carrier_link) for held in self.held_objects()])
 
-    def _touched(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
+    def _touched_objects(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
         """Returns the names of the movable objects that a finger presses on."""
         contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
         # The engine also lists close bodies without contact force.

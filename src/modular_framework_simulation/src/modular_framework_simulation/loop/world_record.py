@@ -113,4 +113,4 @@ class WorldRecord:
         for name in moving:
             body = self._world.bodies[name]
             if not body.static or body.spec is None:
-                self._touched[name] = self._world.touched(body)
+                self._touched[name] = self._world.touched_models(body)

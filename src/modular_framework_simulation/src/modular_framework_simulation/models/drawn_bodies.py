@@ -103,7 +103,7 @@ def drawn_cylinder(radius: float, length: float, colour: Colour, image: Any) -> 
     """
     half = length / 2
     outline = [(0.0, -half), (radius, -half), (radius, -half), (radius, half), (radius, half), (0.0, half)]
-    return _revolved(np.array(outline), colour, image)
+    return _surface_of_revolution(np.array(outline), colour, image)
 
 
 def drawn_sphere(radius: float, colour: Colour, image: Any) -> DrawnBody:
@@ -115,11 +115,11 @@ def drawn_sphere(radius: float, colour: Colour, image: Any) -> DrawnBody:
         image: Texture as a Pillow image; None for a plain colour.
     """
     angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND_SIDES // 2 + 1)
-    body = _revolved(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, image)
+    body = _surface_of_revolution(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, image)
     return replace(body, normals=body.vertices / radius)
 
 
-def _revolved(outline: Array, colour: Colour, image: Any) -> DrawnBody:
+def _surface_of_revolution(outline: Array, colour: Colour, image: Any) -> DrawnBody:
     """Creates the surface of revolution about z of an outline of (radius, height) points."""
     angles = np.linspace(0, 2 * np.pi, _ROUND_SIDES + 1)
     low, high = outline[:, 1].min(), outline[:, 1].max()

@@ -72,7 +72,7 @@ def _tree_joints(model: Model, root: str, joints_of: dict[str, list[Joint]]) -> 
             if joint.name in used:
                 continue
             used.add(joint.name)
-            outward = joint if joint.parent == link else _reversed(model, joint)
+            outward = joint if joint.parent == link else _reversed_joint(model, joint)
             if outward.child in reached:
                 raise DescriptionError(
                     joint.where or f"{model.source}: joint '{joint.name}'",
@@ -85,7 +85,7 @@ def _tree_joints(model: Model, root: str, joints_of: dict[str, list[Joint]]) -> 
     return tuple(joints)
 
 
-def _reversed(model: Model, joint: Joint) -> Joint:
+def _reversed_joint(model: Model, joint: Joint) -> Joint:
     """Returns the joint with parent and child exchanged and the same meaning of its position."""
     poses = {link.name: link.pose for link in model.links}
     pose = poses[joint.parent].inverse() @ poses[joint.child] @ joint.pose

@@ -74,7 +74,7 @@ class ConvexParts:
         Raises:
             DescriptionError: The mesh cannot be read or has no volume.
         """
-        return self._cached(mesh, "hull")[0]
+        return self._cached_files(mesh, "hull")[0]
 
     def parts(self, mesh: Mesh) -> tuple[Path, ...]:
         """Returns the .obj files of the convex parts of a mesh; a single file for a convex mesh.
@@ -82,13 +82,13 @@ class ConvexParts:
         Raises:
             DescriptionError: The mesh cannot be read or has no volume.
         """
-        return self._cached(mesh, "parts")
+        return self._cached_files(mesh, "parts")
 
     def exact(self, mesh: Mesh) -> Path:
         """Returns the .obj file of a mesh with unchanged triangles, for static bodies."""
-        return self._cached(mesh, "exact")[0]
+        return self._cached_files(mesh, "exact")[0]
 
-    def _cached(self, mesh: Mesh, kind: str) -> tuple[Path, ...]:
+    def _cached_files(self, mesh: Mesh, kind: str) -> tuple[Path, ...]:
         try:
             content = mesh.path.read_bytes()
         except OSError as error:

@@ -114,7 +114,7 @@ class FrameTree:
         """Returns the pose of a joint in the model frame; the default is the pose of its child."""
         return self._pose_of_node(joint, ("joint " + joint.name(),))
 
-    def placed(self, pose: XmlNode | None, base: str = "") -> Pose:
+    def pose_of_element(self, pose: XmlNode | None, base: str = "") -> Pose:
         """Returns the pose of an element in the model frame.
 
         Args:
@@ -132,7 +132,7 @@ class FrameTree:
         base = self._base_of(pose)
         if base in ("", link):
             return pose_of(pose)
-        return self.pose_in_model(link).inverse() @ self.placed(pose)
+        return self.pose_in_model(link).inverse() @ self.pose_of_element(pose)
 
     def link_of(self, node: XmlNode) -> str:
         """Returns the link that a joint's <parent> or <child> refers to, also through frames and models.

@@ -106,12 +106,12 @@ class SdfModels:
             return self.model(model, version, depth, static)
         include = holder.find("include")
         if include is not None:
-            return self.included(include, depth, static)
+            return self.include_model(include, depth, static)
         if root.find("light") is not None or root.find("actor") is not None:
             return None
         raise DescriptionError(root.where, "contains no <model>", "a <model> or <include> is required")
 
-    def included(self, node: XmlNode, depth: int, static: bool | None = None) -> LoadedModel | None:
+    def include_model(self, node: XmlNode, depth: int, static: bool | None = None) -> LoadedModel | None:
         """Reads the model of an <include>, and applies the name, pose and static of the <include>.
 
         Args:
@@ -203,7 +203,7 @@ class SdfModels:
             if child.tag == "model":
                 loaded = self.model(child, version, depth + 1, static)
             elif child.tag == "include":
-                loaded = self.included(child, depth + 1, static)
+                loaded = self.include_model(child, depth + 1, static)
             if loaded is None:
                 continue
             if loaded.spec.name in inner:
@@ -254,18 +254,18 @@ def _add_inner(
 ) -> None:
     """Adds the links and joints of an inner model to the links and joints of the outer model."""
 
-    def scoped(link: str) -> str:
+    def scoped_name(link: str) -> str:
         return link if link == specs.WORLD else f"{name}{SCOPE}{link}"
 
     for link in inner.links:
-        links.append(dataclasses.replace(link, name=scoped(link.name), pose=pose @ link.pose))
+        links.append(dataclasses.replace(link, name=scoped_name(link.name), pose=pose @ link.pose))
         if inner.static and fix_to_world:
             joints.append(
                 specs.Joint(
-                    f"{scoped(link.name)}{SCOPE}static",
+                    f"{scoped_name(link.name)}{SCOPE}static",
                     specs.JointType.FIXED,
                     specs.WORLD,
-                    scoped(link.name),
+                    scoped_name(link.name),
                     pose=Pose(),
                     axis=(0.0, 0.0, 1.0),
                     lower=0.0,
@@ -273,8 +273,8 @@ def _add_inner(
                 )
             )
     for joint in inner.joints if not inner.static else ():
-        parent, child = scoped(joint.parent), scoped(joint.child)
-        joints.append(dataclasses.replace(joint, name=scoped(joint.name), parent=parent, child=child))
+        parent, child = scoped_name(joint.parent), scoped_name(joint.child)
+        joints.append(dataclasses.replace(joint, name=scoped_name(joint.name), parent=parent, child=child))
 
 
 def _scoped_sensor(sensor: specs.SensorElement, inner: str) -> specs.SensorElement:

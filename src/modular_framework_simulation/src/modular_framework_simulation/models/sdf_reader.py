@@ -83,7 +83,7 @@ def _models_of(
     for child in world.children:
         model: LoadedModel | None = None
         if child.tag == "include":
-            model = reader.included(child, 0)
+            model = reader.include_model(child, 0)
         elif child.tag == "model":
             model = reader.model(child, version, 0)
         elif child.tag in _REFUSED_IN_WORLD:
@@ -166,10 +166,10 @@ def with_saved_state(models: list[specs.Model], state: XmlNode | None) -> list[s
         if change is not None and change.children:
             raise DescriptionError(change.where, "adds or removes models", "allowed: a saved world without changes")
     saved = {node.attributes.get("name", ""): node for node in state.find_all("model")}
-    return [_restored(model, saved[model.name]) if model.name in saved else model for model in models]
+    return [_restored_model(model, saved[model.name]) if model.name in saved else model for model in models]
 
 
-def _restored(model: specs.Model, saved: XmlNode) -> specs.Model:
+def _restored_model(model: specs.Model, saved: XmlNode) -> specs.Model:
     notes = list(model.notes)
     pose_node = saved.find("pose")
     pose = pose_of(pose_node) if pose_node is not None else model.pose
@@ -210,12 +210,12 @@ def _scaled_link(link: specs.Link, scale: Vector3) -> specs.Link:
     """
     if all(abs(factor - 1.0) <= 1e-6 for factor in scale):
         return link
-    collisions = (dataclasses.replace(one, geometry=_scaled(one.geometry, scale)) for one in link.collisions)
-    visuals = (dataclasses.replace(one, geometry=_scaled(one.geometry, scale)) for one in link.visuals)
+    collisions = (dataclasses.replace(one, geometry=_scaled_geometry(one.geometry, scale)) for one in link.collisions)
+    visuals = (dataclasses.replace(one, geometry=_scaled_geometry(one.geometry, scale)) for one in link.visuals)
     return dataclasses.replace(link, collisions=tuple(collisions), visuals=tuple(visuals))
 
 
-def _scaled(geometry: specs.Geometry, scale: Vector3) -> specs.Geometry:
+def _scaled_geometry(geometry: specs.Geometry, scale: Vector3) -> specs.Geometry:
     x, y, z = scale
     match geometry:
         case specs.Box(size=(along_x, along_y, along_z)):

@@ -206,13 +206,13 @@ def read_xml(path: Path) -> XmlNode:
         DescriptionError: The file cannot be read or is not well-formed XML.
     """
     try:
-        text = _decoded(path.read_bytes())
+        text = _decoded_text(path.read_bytes())
     except (OSError, UnicodeDecodeError, LookupError) as error:
         raise DescriptionError(str(path), f"cannot be read ({error})", "give a readable XML file") from error
     return parse_xml(text, str(path))
 
 
-def _decoded(content: bytes) -> str:
+def _decoded_text(content: bytes) -> str:
     """Decodes the content of a file with the encoding of its byte order mark or XML declaration; UTF-8 by default."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16")

@@ -120,7 +120,7 @@ class AppliedForces:
         """Removes all wrenches and efforts."""
         self._wrenches, self._efforts = [], []
 
-    def saved(self) -> SavedForces:
+    def save(self) -> SavedForces:
         """Returns a copy of all wrenches and efforts."""
         return SavedForces(tuple(self._wrenches), tuple(self._efforts))
 

@@ -76,10 +76,10 @@ def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> 
     if current.mass == 0.0 and described is not None:
         return described
     centre = body.link_state(link).pose.inverse() @ centre_in_world(engine, body, link)
-    return Inertial(Pose(centre.position), current.mass, _rotated(current.moments, centre))
+    return Inertial(Pose(centre.position), current.mass, _rotated_inertia(current.moments, centre))
 
 
-def _rotated(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, float, float]:
+def _rotated_inertia(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, float, float]:
     """Rotates a diagonal inertia tensor.
 
     Args:

@@ -137,10 +137,12 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
         lower = current.lower if change.lower is None else change.lower
         upper = current.upper if change.upper is None else change.upper
         if not lower <= upper:
-            raise ModelChangeError(f"joint '{joint.scoped}': lower limit {lower:g} is above the upper limit {upper:g}")
+            raise ModelChangeError(
+                f"joint '{joint.scoped_name}': lower limit {lower:g} is above the upper limit {upper:g}"
+            )
         damping = current.damping if change.settings.damping is None else change.settings.damping
         joints = tuple(
-            replace(_limited(each, lower, upper), dynamics=replace(each.dynamics, damping=damping))
+            replace(_with_joint_limits(each, lower, upper), dynamics=replace(each.dynamics, damping=damping))
             if each.name == joint.part
             else each
             for each in body.spec.joints
@@ -202,15 +204,15 @@ def _require_rigid(link: PartName, inertial: specs.Inertial) -> None:
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     if inertial.mass <= 0.0:
-        raise ModelChangeError(f"link '{link.scoped}': mass is {inertial.mass:g} kg; allowed: more than 0")
+        raise ModelChangeError(f"link '{link.scoped_name}': mass is {inertial.mass:g} kg; allowed: more than 0")
     if min(xx, yy, zz) <= 0.0 or minor <= 0.0 or determinant <= 0.0:
         raise ModelChangeError(
-            f"link '{link.scoped}': the inertia {list(inertial.inertia)} is not positive definite; allowed: an inertia "
-            "of a rigid body, for example the result of get_link_properties, scaled with the mass"
+            f"link '{link.scoped_name}': the inertia {list(inertial.inertia)} is not positive definite; allowed: an "
+            "inertia of a rigid body, for example the result of get_link_properties, scaled with the mass"
         )
 
 
-def _limited(joint: specs.Joint, lower: float, upper: float) -> specs.Joint:
+def _with_joint_limits(joint: specs.Joint, lower: float, upper: float) -> specs.Joint:
     rotates = joint.kind in (specs.JointType.CONTINUOUS, specs.JointType.REVOLUTE)
     return replace(joint, kind=specs.JointType.REVOLUTE if rotates else joint.kind, lower=lower, upper=upper)
 

@@ -28,12 +28,12 @@ from modular_framework_simulation.physics.physics_engine import (
     EngineJoint,
     JointKind,
     JointState,
+    LinkContact,
     LinkMotion,
     Log,
     MassProperties,
     PhysicsEngine,
     Surface,
-    Touch,
     refuse_long_names,
 )
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
@@ -311,17 +311,17 @@ class MujocoEngine(PhysicsEngine):
         data.xfrc_applied[body, :3] += force
         data.xfrc_applied[body, 3:] += np.cross(np.subtract(point, data.xipos[body]), force)
 
-    def touches(self, number: int, index: int) -> list[Touch]:
+    def link_contacts(self, number: int, index: int) -> list[LinkContact]:
         """Returns the contacts of a link with other bodies."""
         bodies, forces, distances = self._dynamics.contacts()
         body_touches = []
         for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
             other = int(self._body_id_of[bodies[row, 1 - side]])
             if other != number:
-                body_touches.append(Touch(other, float(forces[row]), float(distances[row])))
+                body_touches.append(LinkContact(other, float(forces[row]), float(distances[row])))
         return body_touches
 
-    def touched(self, number: int) -> set[int]:
+    def touched_bodies(self, number: int) -> set[int]:
         """Returns the bodies that a body presses on."""
         bodies, forces, _ = self._dynamics.contacts()
         sides = self._body_id_of[bodies[forces > 0.0]]

@@ -26,7 +26,7 @@ class PartName:
     part: str
 
     @property
-    def scoped(self) -> str:
+    def scoped_name(self) -> str:
         """Returns the full name, model::part."""
         return f"{self.model}{SCOPE}{self.part}"
 
@@ -59,11 +59,11 @@ def _find(
     if separator and not models_in_name:
         raise UnknownEntityError("model", model, list(bodies))
     known = [PartName(each, own) for each in models_in_name or bodies for own in parts(bodies[each])]
-    found = [item for item in known if name in (item.scoped, item.part)]
+    found = [item for item in known if name in (item.scoped_name, item.part)]
     if not found:
-        raise UnknownEntityError(kind, name, [item.scoped for item in known])
+        raise UnknownEntityError(kind, name, [item.scoped_name for item in known])
     if len(found) > 1:
-        raise AmbiguousNameError(kind, name, [item.scoped for item in found])
+        raise AmbiguousNameError(kind, name, [item.scoped_name for item in found])
     return found[0]
 
 
@@ -83,4 +83,4 @@ def find_frame(bodies: Mapping[str, SimulatedBody], name: str, world_frames: Col
         return name
     if SCOPE not in name and not any(name in body.link_names() for body in bodies.values()):
         raise UnknownEntityError("model", name, list(bodies))
-    return find_link(bodies, name).scoped
+    return find_link(bodies, name).scoped_name

@@ -100,7 +100,7 @@ class MassProperties(NamedTuple):
     centre_in_link: Pose
 
 
-class Touch(NamedTuple):
+class LinkContact(NamedTuple):
     """Contact with another body: its id, normal force [N] and distance [m], which is negative for penetration."""
 
     other: int
@@ -346,11 +346,11 @@ class PhysicsEngine(ABC):
         """
 
     @abstractmethod
-    def touches(self, number: int, index: int) -> list[Touch]:
+    def link_contacts(self, number: int, index: int) -> list[LinkContact]:
         """Returns the contacts of a link with other bodies in the last step; a near body has force 0."""
 
     @abstractmethod
-    def touched(self, number: int) -> set[int]:
+    def touched_bodies(self, number: int) -> set[int]:
         """Returns the ids of the bodies that any link of a body pressed on in the last step.
 
         The contacts of a sleeping body may be unknown; its neighbours stay asleep.

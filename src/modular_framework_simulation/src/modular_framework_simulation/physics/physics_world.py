@@ -417,13 +417,13 @@ class PhysicsWorld:
         """Returns the contacts of a link, except contacts with links of its own body."""
         return [
             Contact(self._names_by_body_id[touch.other], touch.force, touch.distance)
-            for touch in self.engine.touches(body.number, link_index)
+            for touch in self.engine.link_contacts(body.number, link_index)
             if touch.other in self._names_by_body_id
         ]
 
-    def touched(self, body: SimulatedBody) -> set[str]:
+    def touched_models(self, body: SimulatedBody) -> set[str]:
         """Returns the names of the other models that any link of a model pressed on in the last step."""
-        ids = {other for part in body.parts for other in self.engine.touched(part.number)}
+        ids = {other for part in body.parts for other in self.engine.touched_bodies(part.number)}
         return {self._names_by_body_id[each] for each in ids if each in self._names_by_body_id} - {body.name}
 
     def contact_points(self, model: str, link: str) -> list[ContactPoint]:
@@ -498,7 +498,7 @@ class PhysicsWorld:
         The state does not include controllers, their commands, and settings changed by requests.
         """
         self.rest.disturb()  # as in `restore_state`, so that both runs continue identically
-        forces = self.forces.saved()
+        forces = self.forces.save()
         return WorldState(
             self.engine.save_state(), self._body_ids(), tuple(self._welds), self._steps, self._time_ns, forces
         )

@@ -28,16 +28,16 @@ from modular_framework_simulation.physics.physics_engine import (
     EngineJoint,
     JointKind,
     JointState,
+    LinkContact,
     LinkMotion,
     Log,
     MassProperties,
     PhysicsEngine,
     Surface,
-    Touch,
     refuse_long_names,
 )
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics.pybullet_rest import Rest
+from modular_framework_simulation.physics.pybullet_rest import SleepingBodies
 from modular_framework_simulation.physics.pybullet_store import BodyStore
 from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_simulation.physics.surfaces import softness_of
@@ -58,7 +58,7 @@ _WELD_FORCE = 1e5
 
 
 @contextlib.contextmanager
-def _silenced() -> Iterator[None]:
+def _silence_output() -> Iterator[None]:
     """Discards terminal output of the engine's C++ code; its errors are raised as exceptions."""
     saved = [(os.dup(number), number) for number in (1, 2)]
     try:
@@ -74,7 +74,7 @@ def _silenced() -> Iterator[None]:
 
 def load_pybullet() -> Any:
     """Imports the engine's module without its terminal output."""
-    with _silenced():
+    with _silence_output():
         import pybullet
     return pybullet
 
@@ -192,7 +192,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def _forget_bodies(self) -> None:
         self._store = BodyStore(self.api, self.client, lambda text: self._load_text(text, False, 0))
-        self._rest = Rest(self.api, self.client, self.settings, self._store)
+        self._rest = SleepingBodies(self.api, self.client, self.settings, self._store)
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
         """Loads a body; see `PhysicsEngine`."""
@@ -226,7 +226,7 @@ class PyBulletEngine(PhysicsEngine):
         # contact points at once instead of one.
         flags |= self.api.URDF_USE_IMPLICIT_CYLINDER | self.api.URDF_USE_INERTIA_FROM_FILE
         flags |= self.api.URDF_INITIALIZE_SAT_FEATURES
-        with _silenced():
+        with _silence_output():
             body: int = self.api.loadURDF(str(file), useFixedBase=fixed, flags=flags, physicsClientId=self.client)
         file.unlink()
         return body
@@ -273,7 +273,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def resting(self) -> Collection[int]:
         """Returns the sleeping bodies."""
-        return self._rest.known
+        return self._rest.bodies_at_rest
 
     def save_state(self) -> int:
         """Saves the state, contacts and caches in the engine.
@@ -409,14 +409,14 @@ class PyBulletEngine(PhysicsEngine):
 
     def base_centre(self, number: int) -> Pose:
         """Returns the pose of the root link's centre of mass."""
-        stored = self._store.stored.get(number)
+        stored = self._store.stored_poses.get(number)
         if stored is not None:
             return stored
         return Pose(*self.api.getBasePositionAndOrientation(self._id(number), physicsClientId=self.client))
 
     def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
         """Returns linear and angular velocity of the root link's centre of mass."""
-        if number in self._store.stored:
+        if number in self._store.stored_poses:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         linear, angular = self.api.getBaseVelocity(self._id(number), physicsClientId=self.client)
         return linear, angular
@@ -476,14 +476,16 @@ class PyBulletEngine(PhysicsEngine):
 
         self._rest.disturb(number, apply)
 
-    def touches(self, number: int, index: int) -> list[Touch]:
+    def link_contacts(self, number: int, index: int) -> list[LinkContact]:
         """Returns the contacts of a link with other bodies."""
-        touches = [Touch(self._store.number(point[2]), point[9], point[8]) for point in self._contacts(number, index)]
+        touches = [
+            LinkContact(self._store.number(point[2]), point[9], point[8]) for point in self._contacts(number, index)
+        ]
         return [touch for touch in touches if touch.other != number]
 
-    def touched(self, number: int) -> set[int]:
+    def touched_bodies(self, number: int) -> set[int]:
         """Returns the bodies that a body presses on; none for a stored body."""
-        if number in self._store.stored:
+        if number in self._store.stored_poses:
             return set()
         points = self.api.getContactPoints(bodyA=self._id(number), physicsClientId=self.client)
         return {self._store.number(point[2]) for point in points if point[9] > 0.0} - {number}

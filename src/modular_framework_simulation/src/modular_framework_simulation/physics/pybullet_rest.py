@@ -42,7 +42,7 @@ _NEAR_M = 0.1
 twice this distance a body is stored."""
 
 
-class Rest:
+class SleepingBodies:
     """Sleeping bodies of a connection to the engine. Movable bodies without joints and static bodies can sleep.
 
     Args:
@@ -94,7 +94,7 @@ class Rest:
 
     def body_id(self, body: int) -> int:
         """Returns the engine's id of a body, which is loaded again if it is stored."""
-        if body in self._store.stored:
+        if body in self._store.stored_poses:
             self._bring_back([body])
         return self._store.body_id(body)
 
@@ -107,7 +107,7 @@ class Rest:
 
     def _bring_back_near(self, body: int) -> list[int]:
         """Brings the stored bodies at a body back, and returns them."""
-        found = self._store.find(self._boxes([body])) if self._store.stored else []
+        found = self._store.find(self._boxes([body])) if self._store.stored_poses else []
         self._bring_back(found)
         return found
 
@@ -195,13 +195,13 @@ class Rest:
         return Boxes.of_corners(corners for body in bodies for corners in self._link_corners(body).values())
 
     @property
-    def known(self) -> Collection[int]:
+    def bodies_at_rest(self) -> Collection[int]:
         """Static bodies, and bodies that have been asleep for at least REST_LOOK_S."""
         return self._never_move | self._known
 
     def _look(self) -> None:
         """Updates the sleeping bodies; this check detects bodies that the engine has woken by a contact."""
-        slept = {body for body in self._inside if self._rests(body)} | self._store.stored.keys()
+        slept = {body for body in self._inside if self._rests(body)} | self._store.stored_poses.keys()
         self._known, self._slept = slept & self._slept, slept
         asleep = [body for body in self._known & self._inside if self._store.can_store(body)]
         if len(asleep) > MAX_ASLEEP:
@@ -220,7 +220,7 @@ class Rest:
     def before_step(self) -> None:
         """Brings back the stored bodies that a moving body approaches; must be called before every step."""
         steps = self._steps - self._checked
-        if not self._store.stored or not (self._may_approach or steps >= _APPROACH_STEPS):
+        if not self._store.stored_poses or not (self._may_approach or steps >= _APPROACH_STEPS):
             return
         moving = [*self._jointed, *(body for body in sorted(self._inside) if not self._rests(body))]
         corners = {(body, link): box for body in moving for link, box in self._link_corners(body).items()}
@@ -238,13 +238,13 @@ class Rest:
 
     def wake_all(self) -> None:
         """Wakes all bodies."""
-        self._bring_back(list(self._store.stored))
+        self._bring_back(list(self._store.stored_poses))
         for body in self._woken:
             self.wake(body)
 
     def _rests(self, body: int) -> bool:
         """Returns whether a body sleeps; the velocities of a sleeping body are exactly 0."""
-        if body in self._store.stored:
+        if body in self._store.stored_poses:
             return True
         if (self._steps - self._woken[body]) * self._settings.time_step_s < _REST_AFTER_S:
             return False

@@ -86,7 +86,7 @@ class BodyStore:
         self._boxes = Boxes.of_corners(())
 
     @property
-    def stored(self) -> dict[int, Pose]:
+    def stored_poses(self) -> dict[int, Pose]:
         """Returns the poses of the centres of mass of the stored bodies, by number."""
         return self._stored
 

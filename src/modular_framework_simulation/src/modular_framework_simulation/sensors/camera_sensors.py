@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Camera, CameraTopics, Pinhole
-from modular_framework_simulation.sensors.sensor_xml import SensorXml, prefixed, resolved
+from modular_framework_simulation.sensors.sensor_xml import SensorXml, prefixed_frame, resolved_topic
 
 TYPES = ("camera", "depth", "depth_camera", "rgbd_camera")
 PLUGINS = ("gazebo_ros_camera", "gazebo_ros_openni_kinect", "gazebo_ros_depth_camera")
@@ -34,9 +34,9 @@ def read_camera(xml: SensorXml, seed: int) -> Camera:
     else:
         sensor_name = sensor.node.attributes.get("name", "camera")
         namespace = xml.namespace()
-        base = resolved(namespace, plugin.text("cameraName", sensor_name)).lstrip("/")
+        base = resolved_topic(namespace, plugin.text("cameraName", sensor_name)).lstrip("/")
         topics = _plugin_topics(xml, base, with_depth)
-        frame = prefixed(namespace, plugin.text("frameName")) if plugin.text("frameName") else xml.link
+        frame = prefixed_frame(namespace, plugin.text("frameName")) if plugin.text("frameName") else xml.link
         plugin_rate = plugin.number("updateRate", 0.0, 0.0)
         if with_depth:
             depth_range = (plugin.number("pointCloudCutoff", 0.4), plugin.number("pointCloudCutoffMax", 5.0))
@@ -81,7 +81,7 @@ def _plugin_topics(xml: SensorXml, base: str, with_depth: bool) -> CameraTopics:
     assert plugin is not None
 
     def topic(key: str, default: str) -> str:
-        return resolved(base, plugin.text(key, default)).lstrip("/")
+        return resolved_topic(base, plugin.text(key, default)).lstrip("/")
 
     image, info = topic("imageTopicName", "image_raw"), topic("cameraInfoTopicName", "camera_info")
     if not with_depth:

@@ -17,7 +17,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_world import ContactPoint, PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import add, cross
-from modular_framework_simulation.sensors.sensor_xml import LinkShapes, Sensor, SensorXml, resolved
+from modular_framework_simulation.sensors.sensor_xml import LinkShapes, Sensor, SensorXml, resolved_topic
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 TYPES = ("contact",)
@@ -79,7 +79,7 @@ def read_contact(xml: SensorXml) -> ContactSensor:
     if xml.plugin is None:
         topic, frame = xml.require_topic(", ".join(PLUGINS)), "world"
     else:
-        topic = resolved(xml.namespace(), xml.plugin.text("bumperTopicName", "bumper_states"))
+        topic = resolved_topic(xml.namespace(), xml.plugin.text("bumperTopicName", "bumper_states"))
         frame = xml.plugin.text("frameName", "world").lstrip("/")
     reference_link = "" if frame in WORLD_FRAMES else f"{xml.scope}{frame.rpartition(SCOPE)[2]}"
     if reference_link and reference_link not in xml.model.links:
@@ -111,7 +111,7 @@ def _shapes(xml: SensorXml) -> tuple[str, tuple[str, ...]]:
     found: dict[str, str] = {}
     for node in nodes:
         full_name = node.text.strip()
-        name = _known(full_name.rpartition(SCOPE)[2], known_shapes)
+        name = _known_shape(full_name.rpartition(SCOPE)[2], known_shapes)
         if name is None:
             raise ValueError(f"<contact/collision>: got '{full_name}'; allowed: {', '.join(known_shapes)}")
         found[name] = known_shapes[name]
@@ -120,7 +120,7 @@ def _shapes(xml: SensorXml) -> tuple[str, tuple[str, ...]]:
     return next(iter(found.values())), tuple(found)
 
 
-def _known(name: str, known_shapes: Mapping[str, str]) -> str | None:
+def _known_shape(name: str, known_shapes: Mapping[str, str]) -> str | None:
     """Returns the shape that a name refers to; Gazebo renames the shapes of links merged by fixed joints."""
     merged = _MERGED_NAME.fullmatch(name)
     short = merged.group(1) if merged else name

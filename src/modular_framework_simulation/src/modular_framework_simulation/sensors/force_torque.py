@@ -12,7 +12,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import WORLD
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
-from modular_framework_simulation.sensors.sensor_xml import JointPart, Sensor, SensorXml, resolved
+from modular_framework_simulation.sensors.sensor_xml import JointPart, Sensor, SensorXml, resolved_topic
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 TYPES = ("force_torque",)
@@ -73,7 +73,7 @@ def read_force_torque(xml: SensorXml) -> ForceTorqueSensor:
     noise = Noise(stddev=xml.plugin.number("gaussianNoise", 0.0, 0.0))
     return ForceTorqueSensor(
         *(xml.name, xml.model.name, part.child, Pose()),
-        resolved(xml.namespace(), xml.plugin.text("topicName", "wrench")),
+        resolved_topic(xml.namespace(), xml.plugin.text("topicName", "wrench")),
         xml.plugin.text("frameName", part.child.rpartition("::")[2]),
         xml.plugin.number("updateRate", 0.0, 0.0) or DEFAULT_RATE_HZ,
         joint,

@@ -16,7 +16,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, twist_at
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
-from modular_framework_simulation.sensors.sensor_xml import Sensor, SensorXml, prefixed, resolved, slower_of
+from modular_framework_simulation.sensors.sensor_xml import Sensor, SensorXml, prefixed_frame, resolved_topic, slower_of
 from modular_framework_urdf.rotations import Quaternion, Vector3, multiply_quaternions, rotate_vector
 
 TYPES = ("imu",)
@@ -125,8 +125,8 @@ def _read_model_plugin(xml: SensorXml, sensor: ImuSensor) -> ImuSensor:
         _with_more_noise(sensor, rates, accelerations),
         link=link,
         pose=sensor_in_link,
-        topic=resolved(namespace, plugin.text("topicName", "imu" if hector else "/default_imu")),
-        frame_id=prefixed("", frame),
+        topic=resolved_topic(namespace, plugin.text("topicName", "imu" if hector else "/default_imu")),
+        frame_id=prefixed_frame("", frame),
         rate_hz=slower_of(sensor.rate_hz, plugin.number("updateRate", 0.0, 0.0)),
     )
 
@@ -140,14 +140,14 @@ def _with_more_noise(sensor: ImuSensor, rates: float, accelerations: float) -> I
         accelerations: Standard deviation of the additional noise of the specific force [m/s^2].
     """
 
-    def increased(noises: Noises, stddev: float) -> Noises:
+    def increased_noises(noises: Noises, stddev: float) -> Noises:
         x, y, z = (replace(noise, stddev=math.hypot(noise.stddev, stddev)) for noise in noises)
         return (x, y, z)
 
     return replace(
         sensor,
-        rate_noise=increased(sensor.rate_noise, rates),
-        acceleration_noise=increased(sensor.acceleration_noise, accelerations),
+        rate_noise=increased_noises(sensor.rate_noise, rates),
+        acceleration_noise=increased_noises(sensor.acceleration_noise, accelerations),
     )
 
 

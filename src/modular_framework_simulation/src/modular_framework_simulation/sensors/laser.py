@@ -12,7 +12,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
 from modular_framework_simulation.sensors.ray_scene import RayScene
-from modular_framework_simulation.sensors.sensor_xml import Sensor, SensorXml, prefixed, resolved
+from modular_framework_simulation.sensors.sensor_xml import Sensor, SensorXml, prefixed_frame, resolved_topic
 from modular_framework_urdf.rotations import rotate_vector
 
 TYPES = ("ray", "gpu_ray", "lidar", "gpu_lidar")
@@ -92,7 +92,7 @@ def _names(xml: SensorXml) -> tuple[str, str]:
         return xml.require_topic(", ".join(PLUGINS)), xml.link
     namespace = xml.namespace()
     topic, frame = xml.plugin.text("topicName", _DEFAULT_TOPIC), xml.plugin.text("frameName", _DEFAULT_FRAME)
-    return resolved(namespace, topic), prefixed(namespace, frame)
+    return resolved_topic(namespace, topic), prefixed_frame(namespace, frame)
 
 
 class Laser:

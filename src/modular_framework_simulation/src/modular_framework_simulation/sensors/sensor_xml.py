@@ -123,7 +123,7 @@ class SensorXml:
         topic = self.sensor.text("topic")
         if topic in ("", _NO_TOPIC):
             raise ValueError(f"has no topic; add a <plugin> ({plugins}) or a <topic>")
-        return resolved(self.model.namespace, topic)
+        return resolved_topic(self.model.namespace, topic)
 
     def namespace(self) -> str:
         """Returns the plugin's <robotNamespace>; by default, the model's namespace."""
@@ -142,13 +142,13 @@ class SensorXml:
         return link
 
 
-def resolved(namespace: str, topic: str) -> str:
+def resolved_topic(namespace: str, topic: str) -> str:
     """Returns the full name of a topic in a namespace; a name that starts with "/" is not changed."""
     base = namespace.rstrip("/")
     return topic if topic.startswith("/") or not base else f"{base}/{topic}"
 
 
-def prefixed(namespace: str, frame: str) -> str:
+def prefixed_frame(namespace: str, frame: str) -> str:
     """Returns a frame with the namespace as prefix; a leading "/" prevents the prefix and is removed, as in tf2."""
     base = namespace.strip("/")
     return frame.lstrip("/") if frame.startswith("/") or not base else f"{base}/{frame}"

@@ -48,7 +48,7 @@ class Access:
         return ""
 
     @contextlib.contextmanager
-    def enforced(self, **changed: Any) -> Iterator[None]:
+    def enforce_checks(self, **changed: Any) -> Iterator[None]:
         """Makes the server that viser starts in this context check its requests, because viser has no such option.
 
         Args:

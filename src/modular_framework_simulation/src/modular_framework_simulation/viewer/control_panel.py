@@ -84,7 +84,7 @@ class ControlPanel:
         self._resumed = gui.add_button("Resume", visible=False)
         self._step = gui.add_button_group("Step", tuple(_STEPS_S))
         self._speed = gui.add_dropdown(
-            "Speed", _speeds(1.0), initial_value=_speed(1.0), hint="Maximum real time factor"
+            "Speed", _speeds(1.0), initial_value=_speed_text(1.0), hint="Maximum real time factor"
         )
         self._known_speed = self._speed.value
         reset = gui.add_button("Reset poses", hint="/gazebo/reset_world: time continues")
@@ -120,7 +120,7 @@ class ControlPanel:
             factor = self._commands.real_time_factor()
         except CommandError:
             return
-        self._known_speed = _speed(factor)
+        self._known_speed = _speed_text(factor)
         self._speed.options = _speeds(factor)
         self._speed.value = self._known_speed
 
@@ -198,10 +198,10 @@ class ControlPanel:
             self._image.visible = picture is not None
 
 
-def _speed(factor: float) -> str:
+def _speed_text(factor: float) -> str:
     return f"{factor:g}" if factor else AS_FAST_AS_POSSIBLE
 
 
 def _speeds(current: float) -> tuple[str, ...]:
     """Returns the selectable speeds, including the current speed."""
-    return (*(_speed(factor) for factor in sorted({*_FACTORS, current} - {0.0})), AS_FAST_AS_POSSIBLE)
+    return (*(_speed_text(factor) for factor in sorted({*_FACTORS, current} - {0.0})), AS_FAST_AS_POSSIBLE)

@@ -28,7 +28,7 @@ class PageConnections:
         """Returns whether a WebSocket is open."""
         return any(connection.state is State.OPEN for connection in tuple(self._connections))
 
-    def kind(self, *args: Any, **options: Any) -> ServerConnection:
+    def create_connection(self, *args: Any, **options: Any) -> ServerConnection:
         """Creates a registered connection; the argument `create_connection` of `websockets.asyncio.server.serve`."""
         return _RegisteredConnection(self, *args, **options)
 

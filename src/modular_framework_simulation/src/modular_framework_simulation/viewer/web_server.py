@@ -60,7 +60,7 @@ class WebServer:
         import viser  # takes a second to import
 
         self._access, self._connections = Access(), PageConnections()
-        hooks = self._access.enforced(create_connection=self._connections.kind)
+        hooks = self._access.enforce_checks(create_connection=self._connections.create_connection)
         with contextlib.redirect_stdout(io.StringIO()), hooks:  # without viser's banner
             self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
         self.host, self.port = host, int(self.viser.get_port())
