@@ -129,7 +129,7 @@ def test_a_shaft_where_the_fingers_cannot_be_is_a_fault_until_it_is_back_and_not
     for _ in range(2):
         with pytest.raises(GripperError, match="servo 1: its shaft is outside the travel"):
             servos.restore_zeros()
-        assert servos.calibrated
+        assert servos.is_calibrated
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 1250 - 4096)
     assert not servos.restore_zeros()
     assert bus.new_words() == []

@@ -181,7 +181,7 @@ class FakeProcess:
                 robot_mode=RUNNING,
                 safety_mode=NORMAL,
                 runtime_state=PLAYING,
-            ).packed()
+            ).to_bytes()
         elif not self._said:
             self._said = True
             yield READY

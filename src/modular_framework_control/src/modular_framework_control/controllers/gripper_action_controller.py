@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.controller_interface.pid import PidGains
 from modular_framework_control.controllers.joint_command_controllers import JointControlSnapshot
-from modular_framework_control.hardware_interface.handles import JointHandle, unmeasured
+from modular_framework_control.hardware_interface.handles import JointHandle, measurement_fault
 from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limit_parameters import GOAL_TOLERANCE
 from modular_framework_control.hardware_interface.joint_limits import limits_of
@@ -155,7 +155,7 @@ class GripperActionController(Controller):
     def starting(self, time_s: float) -> None:
         self._reject_pending("the goal was sent while the controller was stopping")
         self._active, self._fault = None, ""
-        missing = unmeasured([self._handle])
+        missing = measurement_fault([self._handle])
         if missing:
             raise ControllerError(missing)
         self._max_effort = self._default_max_effort
@@ -198,7 +198,7 @@ class GripperActionController(Controller):
         if self._active is not None:
             self._command = self._active.position
         self._mailbox.process(lambda goal: self._process(goal, time_s))
-        missing = unmeasured([self._handle])
+        missing = measurement_fault([self._handle])
         if missing and self._active is not None:
             self._finish(GoalStatus.ABORTED, self._state(False, False), missing)
             self._hold()

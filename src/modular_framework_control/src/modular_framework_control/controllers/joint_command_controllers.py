@@ -102,25 +102,25 @@ class JointCommandController(Controller):
 
     def starting(self, time_s: float) -> None:
         self._fault = ""
-        self._rest()
+        self._hold_joints()
 
     def stopping(self, time_s: float) -> None:
-        self._rest()
+        self._hold_joints()
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
         self._fault = f"hardware fault: {reason}"
 
     def on_hardware_recovered(self, time_s: float) -> None:
-        self._rest()
+        self._hold_joints()
         self._fault = ""
 
     def update(self, time_s: float, period_s: float) -> None:
         if self._fault:
-            self._rest()
+            self._hold_joints()
         else:
             self._command(self._set_points, period_s)
 
-    def _rest(self) -> None:
+    def _hold_joints(self) -> None:
         """Holds the joints, also when another thread submits a command at the same time."""
         rest_command = self._rest_command()
         self._set_points = rest_command
@@ -141,8 +141,8 @@ class PositionJointPositionController(JointCommandController):
 
     interface_class = PositionJointInterface
 
-    def _rest(self) -> None:
-        super()._rest()
+    def _hold_joints(self) -> None:
+        super()._hold_joints()
         for handle in self._handles:
             handle.hold(handle.position)
 
@@ -207,7 +207,7 @@ class GainsController(JointCommandController):
         super().update(time_s, period_s)
         self._cycles += 1
         if self.single and self.on_state is not None and self._cycles % CYCLES_PER_REPORT == 0:
-            value, rate = self._measured()
+            value, rate = self._measured_quantity()
             self.on_state(
                 JointControlSnapshot(
                     time_s=time_s,
@@ -225,14 +225,14 @@ class GainsController(JointCommandController):
         for handle in self._handles:
             handle.command = 0.0
 
-    def _measured(self) -> tuple[float, float]:
+    def _measured_quantity(self) -> tuple[float, float]:
         """Returns the controlled quantity of the first joint and its derivative."""
         return self._handles[0].position, self._handles[0].velocity
 
-    def _rest(self) -> None:
+    def _hold_joints(self) -> None:
         for pid in self._pids:
             pid.reset()
-        super()._rest()
+        super()._hold_joints()
 
 
 class _PidPositionController(GainsController):
@@ -283,12 +283,12 @@ class EffortJointVelocityController(GainsController):
         super().__init__()
         self._last_error = math.nan
 
-    def _measured(self) -> tuple[float, float]:
+    def _measured_quantity(self) -> tuple[float, float]:
         return self._handles[0].velocity, 0.0
 
-    def _rest(self) -> None:
+    def _hold_joints(self) -> None:
         self._last_error = math.nan
-        super()._rest()
+        super()._hold_joints()
 
     def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
         error = set_points[0] - self._handles[0].velocity

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
-from modular_framework_control.hardware_interface.handles import unmeasured
+from modular_framework_control.hardware_interface.handles import measurement_fault
 from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limits import limits_of
 from modular_framework_control.hardware_interface.robot_hw import speed_scaling_handles
@@ -158,7 +158,7 @@ class JointTrajectoryController(Controller):
                 f"got {time_s:.9g} s, which is before the start of the current motion, by "
                 f"{stored_from_s - trajectory_s:.6g} s of its trajectory; give a later time"
             )
-        return self._clock.slowed(self._plan.sample(trajectory_s))
+        return self._clock.scale_state(self._plan.sample(trajectory_s))
 
     # ---- control loop ----
 
@@ -169,11 +169,11 @@ class JointTrajectoryController(Controller):
         self._state_schedule.start(time_s)
         self._feedback_schedule.start(time_s)
         self._read_actual()
-        self._unmeasured = unmeasured(self._handles)
+        self._unmeasured = measurement_fault(self._handles)
         if self._unmeasured:
             raise ControllerError(self._unmeasured)
         self._plan.hold(self._actual[POSITION], time_s)
-        self._rest()
+        self._hold_joints()
         if np.abs(self._actual[VELOCITY]).max(initial=0.0) > AT_REST:
             self._stop()
         self._running = True
@@ -198,7 +198,7 @@ class JointTrajectoryController(Controller):
         self._fault = ""
         self._clock.advance(time_s)
         self._read_actual()
-        self._rest()
+        self._hold_joints()
 
     def _end_goals(self, status: GoalStatus, text: str) -> None:
         self._running = False
@@ -219,7 +219,7 @@ class JointTrajectoryController(Controller):
         self._watch_positions()
         self._mailbox.process(self._process)
         if self._fault:
-            self._rest()
+            self._hold_joints()
         self._plan.forget_before(self._clock.now_s)
         desired, error = self._desired_and_error()
         if self._active is not None and self._check(self._active, self._clock.now_s, error):
@@ -231,7 +231,7 @@ class JointTrajectoryController(Controller):
 
     def _watch_positions(self) -> None:
         """Stops the motion when a measured position becomes invalid, and again when all positions are valid."""
-        missing = "" if np.isfinite(self._actual[POSITION]).all() else unmeasured(self._handles)
+        missing = "" if np.isfinite(self._actual[POSITION]).all() else measurement_fault(self._handles)
         if bool(missing) != bool(self._unmeasured):
             self._unmeasured = missing
             self._finish(GoalStatus.ABORTED, TrajectoryErrorCode.INVALID_GOAL, missing)
@@ -239,7 +239,7 @@ class JointTrajectoryController(Controller):
 
     def _desired_and_error(self) -> tuple[Array, Array]:
         """Returns the desired position, velocity and acceleration, and the position and velocity errors."""
-        desired = self._clock.slowed(self._plan.sample(self._clock.now_s))
+        desired = self._clock.scale_state(self._plan.sample(self._clock.now_s))
         error = desired[:2] - self._actual
         if self._any_continuous:
             unwrapped = error[POSITION, self._continuous]
@@ -279,7 +279,7 @@ class JointTrajectoryController(Controller):
         self._actual[0] = [state.position for state in states]
         self._actual[1] = [state.velocity for state in states]
 
-    def _rest(self) -> None:
+    def _hold_joints(self) -> None:
         _, actual = self._desired_and_measured()
         self._plan.hold(actual[POSITION], self._clock.now_s)
         self._command_rest()

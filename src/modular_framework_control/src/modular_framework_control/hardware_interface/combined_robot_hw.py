@@ -37,7 +37,7 @@ class HardwarePart:
     hardware: RobotHW
     resources: dict[str, frozenset[str]]
 
-    def concerned(self, controllers: Iterable[ControllerInfo]) -> list[ControllerInfo]:
+    def claims_of(self, controllers: Iterable[ControllerInfo]) -> list[ControllerInfo]:
         """Returns the controllers with claims on this part, without their other claims."""
         result: list[ControllerInfo] = []
         for controller in controllers:
@@ -159,7 +159,7 @@ class CombinedRobotHW(RobotHW):
             if len(offers) == 1:
                 self.register_interface(offers[0][1])
             else:
-                self.register_interface(_combined(interface_class, offers))
+                self.register_interface(_combined_interface(interface_class, offers))
 
     def read(self, time_s: float, period_s: float) -> None:
         for part in self._parts:
@@ -183,7 +183,7 @@ class CombinedRobotHW(RobotHW):
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         infos = list(controllers)
-        conflicts = ((part.name, part.hardware.check_for_conflict(part.concerned(infos))) for part in self._parts)
+        conflicts = ((part.name, part.hardware.check_for_conflict(part.claims_of(infos))) for part in self._parts)
         within_parts = "; ".join(f"{name}: {conflict}" for name, conflict in conflicts if conflict)
         return within_parts or super().check_for_conflict(self._claims_on_shared_joints(infos))
 
@@ -201,7 +201,7 @@ class CombinedRobotHW(RobotHW):
             )
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
-        for part, claims_of_part in self._concerned_by(start, stop):
+        for part, claims_of_part in self._parts_with_claims(start, stop):
             if part.hardware.prepare_switch(*claims_of_part) is not True:
                 LOGGER.error(
                     "hardware '%s' refused to prepare a switch (start: %s; stop: %s)",
@@ -212,14 +212,14 @@ class CombinedRobotHW(RobotHW):
         return True
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        for part, claims_of_part in self._concerned_by(start, stop):
+        for part, claims_of_part in self._parts_with_claims(start, stop):
             part.hardware.do_switch(*claims_of_part)
 
-    def _concerned_by(
+    def _parts_with_claims(
         self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]
     ) -> Iterator[tuple[HardwarePart, tuple[list[ControllerInfo], list[ControllerInfo]]]]:
         for part in self._parts:
-            claims_of_part = part.concerned(start), part.concerned(stop)
+            claims_of_part = part.claims_of(start), part.claims_of(stop)
             if any(claims_of_part):
                 yield part, claims_of_part
 
@@ -230,7 +230,7 @@ class CombinedRobotHW(RobotHW):
                 results.add(part.hardware.switch_result())
             else:
                 results.update(
-                    part.hardware.switch_result(claims_of_part) for claims_of_part in part.concerned([controller])
+                    part.hardware.switch_result(claims_of_part) for claims_of_part in part.claims_of([controller])
                 )
         for state in (SwitchState.ERROR, SwitchState.ONGOING):
             if state in results:
@@ -238,7 +238,7 @@ class CombinedRobotHW(RobotHW):
         return SwitchState.DONE
 
 
-def _combined(
+def _combined_interface(
     interface_class: type[HardwareInterface[Any]], offers: Sequence[tuple[HardwarePart, HardwareInterface[Any]]]
 ) -> HardwareInterface[Any]:
     """Returns one interface with the handles of several parts."""

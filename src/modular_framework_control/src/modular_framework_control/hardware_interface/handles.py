@@ -93,7 +93,7 @@ class JointHandle:
         return f"{type(self).__name__}({self.name!r}, command={self.command:.6g})"
 
 
-def unmeasured(handles: Iterable[JointHandle]) -> str:
+def measurement_fault(handles: Iterable[JointHandle]) -> str:
     """Returns a description of joints whose measured positions are not finite, or ""."""
     faults = [
         f"joint '{handle.name}' is measured at {handle.position}"

@@ -115,9 +115,9 @@ class PosVelJointSaturation(PositionJointSaturation):
     def enforce_limits(self, period_s: float) -> None:
         super().enforce_limits(period_s)
         handle: Any = self.handle
-        handle.command_velocity = _clamped(handle.command_velocity, self.limits.max_velocity)
+        handle.command_velocity = _clamped_value(handle.command_velocity, self.limits.max_velocity)
         if hasattr(handle, "command_acceleration"):
-            handle.command_acceleration = _clamped(handle.command_acceleration, self.limits.max_acceleration)
+            handle.command_acceleration = _clamped_value(handle.command_acceleration, self.limits.max_acceleration)
 
 
 class _Saturation:
@@ -144,10 +144,10 @@ class _Saturation:
 
     def reset(self) -> None:
         """Clears the limited command, after the joint was moved by other means; the controller's command stays."""
-        self.handle.command = self._commanded()
+        self.handle.command = self._controller_command()
         self._limited = None
 
-    def _commanded(self) -> float:
+    def _controller_command(self) -> float:
         """Returns the last command of a controller, with NaN replaced by 0."""
         command = self.handle.command
         if command is not self._limited:
@@ -174,7 +174,7 @@ class VelocityJointSaturation(_Saturation):
     def enforce_limits(self, period_s: float) -> None:
         """Replaces `handle.command` by the nearest allowed command."""
         limits, state = self.limits, self.handle.state
-        command, position = self._commanded(), state.position
+        command, position = self._controller_command(), state.position
         if self.soft is None:
             lower, upper = -limits.max_velocity, limits.max_velocity
         else:
@@ -210,17 +210,17 @@ class EffortJointSaturation(_Saturation):
         if self.soft is not None:
             min_velocity, max_velocity = soft_velocities(position, limits, self.soft)
             if min_velocity > -math.inf:
-                lower = _clamped(self.soft.k_velocity * (min_velocity - velocity), limits.max_effort)
+                lower = _clamped_value(self.soft.k_velocity * (min_velocity - velocity), limits.max_effort)
             if max_velocity < math.inf:
-                upper = _clamped(self.soft.k_velocity * (max_velocity - velocity), limits.max_effort)
+                upper = _clamped_value(self.soft.k_velocity * (max_velocity - velocity), limits.max_effort)
         if position < limits.min_position or velocity < -limits.max_velocity:
             lower = max(lower, 0.0)
         if position > limits.max_position or velocity > limits.max_velocity:
             upper = min(upper, 0.0)
-        self._set_limited(max(lower, min(upper, self._commanded())))
+        self._set_limited(max(lower, min(upper, self._controller_command())))
 
 
-def _clamped(value: float, bound: float) -> float:
+def _clamped_value(value: float, bound: float) -> float:
     """Returns `value` clamped to +-`bound`, with NaN replaced by 0."""
     return max(-bound, min(bound, value)) if value == value else 0.0
 

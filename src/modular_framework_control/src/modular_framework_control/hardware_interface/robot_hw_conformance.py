@@ -155,13 +155,13 @@ class RobotHWConformance(ABC):
     def _hold(self, robot_hw: RobotHW) -> None:
         """Holds the joints as a starting controller does, because the previous test may have commanded anything."""
         robot_hw.read(self._time_s, self.period_s)
-        for _, handles in self._commanded(robot_hw, POSITIONS):
+        for _, handles in self._command_interfaces(robot_hw, POSITIONS):
             for handle in handles:
                 handle.hold(handle.position)
         robot_hw.write(self._time_s, self.period_s)
 
     @staticmethod
-    def _commanded(
+    def _command_interfaces(
         robot_hw: RobotHW, interfaces: Sequence[type[CommandInterface]] = COMMAND_INTERFACES
     ) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
         """Yields the hardware's interfaces among `interfaces`, with their handles."""
@@ -170,12 +170,12 @@ class RobotHWConformance(ABC):
             if interface is not None and interface.handles:
                 yield interface, interface.handles
 
-    def _claimed(
+    def _claimed_joints(
         self, *interfaces: type[CommandInterface]
     ) -> Iterator[tuple[RobotHW, list[JointHandle], dict[JointHandle, float]]]:
         """Yields ready hardware, the joints of each of its interfaces among `interfaces`, and commands of rest."""
         robot_hw = self._ready()
-        for interface, handles in self._commanded(robot_hw, interfaces):
+        for interface, handles in self._command_interfaces(robot_hw, interfaces):
             claim = InterfaceResources(interface.type_name, tuple(handle.name for handle in handles))
             info = ControllerInfo("one", "some/Type", (claim,))
             assert robot_hw.prepare_switch([info], []) is True
@@ -239,13 +239,13 @@ class RobotHWConformance(ABC):
                         f"{state} moved from {starts[state.name]}"
                     )
                 self._cycle(robot_hw, {})
-            rates = self._commanded(robot_hw, (VelocityJointInterface, EffortJointInterface))
+            rates = self._command_interfaces(robot_hw, (VelocityJointInterface, EffortJointInterface))
             assert all(handle.command == 0.0 for _, handles in rates for handle in handles)
             robot_hw.close()
 
     def _commanded_at_rest(self, robot_hw: RobotHW) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
         """Yields the interfaces whose joints stay without a command; with an effort of 0, joints may fall."""
-        return self._commanded(robot_hw, (*POSITIONS, VelocityJointInterface))
+        return self._command_interfaces(robot_hw, (*POSITIONS, VelocityJointInterface))
 
     def test_at_rest_it_has_no_fault(self) -> None:
         robot_hw = self._ready()
@@ -270,12 +270,12 @@ class RobotHWConformance(ABC):
             )
 
     def test_commanded_to_hold_it_stays(self) -> None:
-        for robot_hw, handles, commands in self._claimed(*POSITIONS):
+        for robot_hw, handles, commands in self._claimed_joints(*POSITIONS):
             self._run(robot_hw, commands, 0.5)
             assert all(abs(handle.position - commands[handle]) <= self.tolerance for handle in handles)
 
     def test_each_joint_follows_its_command_and_the_others_stay(self) -> None:
-        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+        for robot_hw, handles, goals in self._claimed_joints(*POSITIONS):
             self._run(robot_hw, goals, 0.1)
             for moved in handles:
                 goals[moved] = self._target(moved, self.step)
@@ -284,7 +284,7 @@ class RobotHWConformance(ABC):
                     assert abs(handle.position - goals[handle]) <= self.tolerance, (moved.name, handle)
 
     def test_velocity_has_the_sign_of_the_motion(self) -> None:
-        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+        for robot_hw, handles, goals in self._claimed_joints(*POSITIONS):
             for handle in handles:
                 start, seen = handle.position, 0.0
                 goals[handle] = self._target(handle, self.step)
@@ -296,7 +296,7 @@ class RobotHWConformance(ABC):
 
     def test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows(self) -> None:
         limits = self.limits()
-        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+        for robot_hw, handles, goals in self._claimed_joints(*POSITIONS):
             limited = [handle for handle in handles if math.isfinite(limits[handle.name].max_velocity)]
             assert limited, f"limits() has no finite max_velocity of any of {[handle.name for handle in handles]}"
             for handle in limited:
@@ -323,7 +323,7 @@ class RobotHWConformance(ABC):
         raise AssertionError(f"{handle.name} has not come from {start} to {goals[handle]}, but to {handle.position}")
 
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
-        for robot_hw, handles, _ in self._claimed(*POSITIONS, VelocityJointInterface):
+        for robot_hw, handles, _ in self._claimed_joints(*POSITIONS, VelocityJointInterface):
             for command in HOSTILE_COMMANDS:
                 self._assert_no_faster_than_the_limit(robot_hw, handles, command)
                 self._assert_within_limits(handles)
@@ -338,7 +338,7 @@ class RobotHWConformance(ABC):
 
     def _assert_that_joints_move(self, interface: type[CommandInterface], size: Callable[[JointLimits], float]) -> None:
         """Commands each joint by `size` of its limits towards the position of `_target`, then by 0."""
-        for robot_hw, handles, commands in self._claimed(interface):
+        for robot_hw, handles, commands in self._claimed_joints(interface):
             for handle in handles:
                 start, target = handle.position, self._target(handle, self.step)
                 direction = math.copysign(1.0, target - start)
@@ -357,7 +357,7 @@ class RobotHWConformance(ABC):
                     assert abs(handle.position - stopped) <= self.tolerance, f"{handle} does not stop"
 
     def test_no_effort_exceeds_the_limits_or_makes_a_joint_faster_than_its_velocity_limit(self) -> None:
-        for robot_hw, handles, _ in self._claimed(EffortJointInterface):
+        for robot_hw, handles, _ in self._claimed_joints(EffortJointInterface):
             for command in HOSTILE_COMMANDS:
                 self._assert_no_faster_than_the_limit(robot_hw, handles, command)
 
@@ -385,7 +385,7 @@ class RobotHWConformance(ABC):
 
     def test_two_controllers_may_not_claim_one_joint(self) -> None:
         robot_hw = self._ready()
-        for interface, handles in self._commanded(robot_hw):
+        for interface, handles in self._command_interfaces(robot_hw):
             name = handles[0].name
             claim = (InterfaceResources(interface.type_name, (name,)),)
             one, other = ControllerInfo("one", "some/Type", claim), ControllerInfo("other", "some/Type", claim)

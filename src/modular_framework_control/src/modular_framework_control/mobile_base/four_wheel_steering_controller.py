@@ -17,7 +17,7 @@ from modular_framework_control.mobile_base.mobile_base_controller import (
     MobileBaseController,
     TwistLimits,
 )
-from modular_framework_control.mobile_base.speed_limiter import clamped
+from modular_framework_control.mobile_base.speed_limiter import clamp
 from modular_framework_control.mobile_base.wheel_geometry import WheelGeometry
 from modular_framework_ros.node_handle import (
     NodeHandle,
@@ -182,7 +182,7 @@ class FourWheelSteeringController(MobileBaseController):
     def _steer(self, command: SteeringCommand, period_s: float) -> list[float]:
         """Returns the steering angles, which do not depend on the speed [rad]."""
         front, rear = (
-            clamped(angle, -math.pi / 2.0, math.pi / 2.0) for angle in (command.front_angle, command.rear_angle)
+            clamp(angle, -math.pi / 2.0, math.pi / 2.0) for angle in (command.front_angle, command.rear_angle)
         )
         speed = self._limits.limit_linear(command.speed, period_s)
         self._twist = self.geometry.twist_of_axles(speed, front, rear)

@@ -13,7 +13,7 @@ JERK_FACTOR = 2.0
 """Factor on jerk limits, as in ros_controllers, whose users' limits are tuned with this factor."""
 
 
-def clamped(value: float, lowest: float, highest: float) -> float:
+def clamp(value: float, lowest: float, highest: float) -> float:
     """Returns the value clamped to a range.
 
     Args:
@@ -51,10 +51,10 @@ class SpeedLimiter:
         if self.jerk != UNLIMITED:
             change = last - before_last
             step_s2 = JERK_FACTOR * period_s * period_s
-            value = last + change + clamped(value - last - change, self.jerk[0] * step_s2, self.jerk[1] * step_s2)
+            value = last + change + clamp(value - last - change, self.jerk[0] * step_s2, self.jerk[1] * step_s2)
         if self.acceleration != UNLIMITED:
-            value = last + clamped(value - last, self.acceleration[0] * period_s, self.acceleration[1] * period_s)
-        return clamped(value, *self.velocity)
+            value = last + clamp(value - last, self.acceleration[0] * period_s, self.acceleration[1] * period_s)
+        return clamp(value, *self.velocity)
 
 
 def read_speed_limiter(limits_nh: NodeHandle) -> SpeedLimiter:

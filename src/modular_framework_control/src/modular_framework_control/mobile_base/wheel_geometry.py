@@ -86,7 +86,7 @@ class WheelGeometry:
         found = link.collisions[0].shapes if link.collisions else ()
         for shape in found:
             if shape.tag in shapes and isinstance(shape, Cylinder | Sphere):
-                return self._checked(shape, name)
+                return self._checked_radius(shape, name)
         tags = ", ".join(f"<{shape.tag}>" for shape in found) or ("empty" if link.collisions else "none")
         raise self._error(
             f"collision geometry of the wheel link '{name}' is {tags}; expected "
@@ -98,7 +98,7 @@ class WheelGeometry:
             raise self._error(f"unknown joint '{name}'; joints: {', '.join(sorted(self._joints)) or 'none'}")
         return self._joints[name]
 
-    def _checked(self, wheel: Cylinder | Sphere, link: str) -> float:
+    def _checked_radius(self, wheel: Cylinder | Sphere, link: str) -> float:
         if not 0.0 < wheel.radius < math.inf:
             raise self._error(f"<{wheel.tag} radius> of link '{link}' is '{wheel.radius:g}'; expected a number above 0")
         return wheel.radius

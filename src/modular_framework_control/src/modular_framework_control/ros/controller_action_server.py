@@ -19,7 +19,7 @@ from modular_framework_ros.action_server import SteadyActionServer
 
 
 @contextlib.contextmanager
-def released(lock: threading.RLock) -> Iterator[None]:
+def released_lock(lock: threading.RLock) -> Iterator[None]:
     """Releases a lock held once by the caller: a cancel request must not wait until a goal has been checked."""
     lock.release()
     try:
@@ -91,7 +91,7 @@ class ControllerActionServer:
         )
         self._goals[goal_handle] = goal
         try:
-            with released(self._server.lock), self._submitting:
+            with released_lock(self._server.lock), self._submitting:
                 self._callbacks.submit(goal.get_goal(), goal_handle)
             if goal.get_goal_status().status == GoalStatusMsg.RECALLING:  # canceled before it was submitted
                 self._callbacks.cancel(goal_handle)

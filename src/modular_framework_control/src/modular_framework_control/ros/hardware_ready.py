@@ -102,14 +102,14 @@ class HardwareReadiness:
             cause, waited_s = fault(), time.monotonic() - begun_s
             if waited_s > timeout_s:
                 raise HardwareNotReadyError(
-                    f"waited {timeout_s:g} s in vain for {self._missing()}; "
+                    f"waited {timeout_s:g} s in vain for {self._missing_readiness()}; "
                     f"{cause or 'is the hardware switched on and connected?'} (~ready_timeout extends the wait)"
                 )
             if cause != logged_fault and waited_s > USUAL_START_S:
                 rospy.logwarn("hardware not ready: %s", cause or "the fault has ended")
                 logged_fault = cause
 
-    def _missing(self) -> str:
+    def _missing_readiness(self) -> str:
         topics = [
             f"topic {self._topics.awaited[name]} of hardware '{name}'"
             for name, event in self._ready.items()

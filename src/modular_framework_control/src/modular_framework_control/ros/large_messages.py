@@ -56,9 +56,9 @@ class ReceiveBuffer:
         """Returns the next `size` bytes; above 64 KiB, as a memory map that can be sliced like bytes."""
         begin, self._position = self._position, min(self._position + size, self._size)
         if self._position - begin <= _PIECE_BYTES:
-            return b"".join(self._parts(begin, self._position))
+            return b"".join(self._pieces_between(begin, self._position))
         message = mmap.mmap(-1, self._position - begin, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        for part in self._parts(begin, self._position):
+        for part in self._pieces_between(begin, self._position):
             message.write(part)
         return message
 
@@ -66,7 +66,7 @@ class ReceiveBuffer:
         """Returns all bytes."""
         return b"".join(self._pieces)
 
-    def _parts(self, begin: int, end: int) -> Iterator[bytes]:
+    def _pieces_between(self, begin: int, end: int) -> Iterator[bytes]:
         offset = 0
         for piece in self._pieces:
             if offset >= end:

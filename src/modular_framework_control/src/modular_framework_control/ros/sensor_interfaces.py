@@ -51,7 +51,7 @@ class SensorRosInterface:
 
 def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
     """Converts the measurement of a force-torque sensor at ROS time `time_s` [s]."""
-    message = _stamped(WrenchStamped(), time_s, handle.frame_id)
+    message = _stamped_message(WrenchStamped(), time_s, handle.frame_id)
     message.wrench.force = Vector3(*handle.force)
     message.wrench.torque = Vector3(*handle.torque)
     return message
@@ -59,7 +59,7 @@ def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamp
 
 def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
     """Converts the measurement of an inertial measurement unit at ROS time `time_s` [s]."""
-    message = _stamped(Imu(), time_s, handle.frame_id)
+    message = _stamped_message(Imu(), time_s, handle.frame_id)
     message.orientation = Quaternion(*handle.orientation)
     message.angular_velocity = Vector3(*handle.angular_velocity)
     message.linear_acceleration = Vector3(*handle.linear_acceleration)
@@ -75,7 +75,7 @@ def speed_scaling_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
     return Float64(handle.factor)
 
 
-def _stamped(message: Any, time_s: float, frame_id: str) -> Any:
+def _stamped_message(message: Any, time_s: float, frame_id: str) -> Any:
     message.header.stamp = rospy.Time.from_sec(time_s)
     message.header.frame_id = frame_id
     return message

@@ -135,13 +135,13 @@ class LimitViolations:
             skipped = bisect_left(indices[:, 0], begin)
             count += len(indices) - skipped
             described += [
-                self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
+                self._describe_violation(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
                 for i in range(skipped, min(len(indices), skipped + _MAX_FAULTS - len(described)))
             ]
         omitted = count - len(described)
         return "; ".join(described) + (f"; and {omitted} more" if omitted else "")
 
-    def _described(self, kind: _Kind, point: int, joint: int, value: float) -> str:
+    def _describe_violation(self, kind: _Kind, point: int, joint: int, value: float) -> str:
         name, allowed, max_velocities = self._names[joint], self._range(joint), self._limits.max_velocities[joint]
         match kind:
             case _Kind.POINT_POSITION:

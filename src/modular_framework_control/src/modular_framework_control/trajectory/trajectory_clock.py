@@ -58,7 +58,7 @@ class TrajectoryClock:
         """Returns the clock's time at loop time `loop_s`, assuming the current rate."""
         return self.now_s + self.rate * (self.at(loop_s) - self.now_s) if self.rate != 1.0 else self.at(loop_s)
 
-    def slowed(self, planned: Array) -> Array:
+    def scale_state(self, planned: Array) -> Array:
         """Scales velocities and accelerations of a planned state, shape (3, joints), by the rate, in place."""
         if self.rate != 1.0:
             planned[VELOCITY] *= self.rate

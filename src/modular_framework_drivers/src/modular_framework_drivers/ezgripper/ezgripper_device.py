@@ -81,7 +81,7 @@ class _Request:
     faults: int
 
 
-class _Ended(Exception):
+class _DeviceClosed(Exception):
     """Raised on the gripper's thread after a call of `close`."""
 
 
@@ -180,7 +180,7 @@ class EzGripper:
                     self._report(str(error))
                     self._bus.close()
                     self._wait(self.settings.reconnect_period_s)
-        except _Ended:
+        except _DeviceClosed:
             self._hold_safely()
         except Exception:
             LOGGER.exception("%s: unexpected error; the gripper cannot be used", self.settings.name)
@@ -202,13 +202,13 @@ class EzGripper:
 
     def _wait(self, duration_s: float) -> None:
         if self._ended.wait(duration_s):
-            raise _Ended
+            raise _DeviceClosed
 
     def _connect(self) -> None:
         """Opens the serial line and initialises the servos; the next cycle handles a motor fault."""
         self._bus.open()
         self._servos.set_up()
-        was_calibrated = self._servos.calibrated
+        was_calibrated = self._servos.is_calibrated
         unchanged = was_calibrated and self._servos.restore_zeros()
         if not was_calibrated:
             self._report("calibrating", logging.INFO)

@@ -103,7 +103,7 @@ class GripperServos:
         self._servos = [_Servo(servo_id) for servo_id in servo_ids]
 
     @property
-    def calibrated(self) -> bool:
+    def is_calibrated(self) -> bool:
         """Returns whether the zero positions of all servos are known."""
         return all(servo.zero is not None for servo in self._servos)
 

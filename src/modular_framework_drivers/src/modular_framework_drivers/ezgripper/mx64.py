@@ -127,7 +127,7 @@ def from_bytes(data: bytes | bytearray) -> int:
     return int.from_bytes(data, "little")
 
 
-def signed(word: int) -> int:
+def from_signed_word(word: int) -> int:
     """Returns a 16-bit word as a signed number, such as a position in multi-turn mode."""
     return word - 0x10000 if word & 0x8000 else word
 
@@ -145,7 +145,7 @@ def direction_word(value: int) -> int:
 def parse_reading(data: bytes, errors: ServoErrors) -> Reading:
     """Parses the eight bytes of the register READING."""
     return Reading(
-        signed(from_bytes(data[0:2])),
+        from_signed_word(from_bytes(data[0:2])),
         from_direction_word(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,
         from_direction_word(from_bytes(data[4:6])) / TORQUE_MAX,
         data[6] / 10.0,

@@ -58,7 +58,7 @@ class ArmState:
         """Returns the robot mode, the safety mode and the runtime state of the program."""
         return self.robot_mode, self.safety_mode, self.runtime_state
 
-    def packed(self) -> bytes:
+    def to_bytes(self) -> bytes:
         """Returns the state as a message."""
         return _STATE.pack(
             STATE,
@@ -75,7 +75,7 @@ class ArmState:
         )
 
     @classmethod
-    def unpacked(cls, message: bytes) -> ArmState:
+    def from_bytes(cls, message: bytes) -> ArmState:
         """Returns the state in a message."""
         values = _STATE.unpack(message)
         speed_fraction, speed_scaling, robot_mode, safety_mode, runtime_state, late_s = values[27:]

@@ -198,7 +198,7 @@ class RtdeLink:
         if newest:
             if self.lost:
                 LOGGER.info("arm at %s: connected", self._settings.address)
-            self.state, self.lost, states.working = ArmState.unpacked(newest), "", True
+            self.state, self.lost, states.working = ArmState.from_bytes(newest), "", True
         if states.process.ended:
             self._lose_connection(states, "the process that reads the arm's state ended")
         elif states.working and silent_s > self._silence_timeout_s:
@@ -298,17 +298,17 @@ class RtdeLink:
         settings, speed_scale = self._settings, self._settings.speed_scale
         if speed_scale is not None and self._has_commanded and self.state is not None:
             speed_scale = min(speed_scale, self.state.speed_fraction)  # an operator may have lowered the slider
-        scale = [] if speed_scale is None else ["--speed-scale", _formatted(speed_scale)]
+        scale = [] if speed_scale is None else ["--speed-scale", _argument_text(speed_scale)]
         return [
             *scale,
             "--payload",
-            _formatted(settings.payload_kg),
+            _argument_text(settings.payload_kg),
             "--payload-centre",
-            *map(_formatted, settings.payload_centre_m),
+            *map(_argument_text, settings.payload_centre_m),
             "--lookahead",
-            _formatted(settings.lookahead_s),
+            _argument_text(settings.lookahead_s),
             "--gain",
-            _formatted(settings.gain),
+            _argument_text(settings.gain),
         ]
 
     def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _RtdeProcess:
@@ -316,6 +316,6 @@ class RtdeLink:
         return _RtdeProcess(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)
 
 
-def _formatted(number: float) -> str:
+def _argument_text(number: float) -> str:
     """Formats a number for a command line, which would parse -5e-05 as an option."""
     return f"{number:.9f}"

@@ -88,7 +88,7 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
             damaged_count = 0 if heard else damaged_count + 1
             if heard:
                 last_state, last_sent_s = state, now_s
-                _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).packed())
+                _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).to_bytes())
         if not heard and not arm.isConnected():
             raise ConnectionEndedError("the arm closed the connection")
         if silence.update(now_s, heard) > options.timeout:
