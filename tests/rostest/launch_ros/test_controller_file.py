@@ -118,4 +118,4 @@ def test_a_goal_time_ends_a_late_goal(follow: Callable[[str], Result]) -> None:
 
 def test_every_parameter_of_the_file_is_known_or_converted(follow: Callable[[str], Result], robot: RosSession) -> None:
     follow("zero")
-    assert "names no parameter" not in robot.printed()
+    assert "names no parameter" not in robot.printed_output()

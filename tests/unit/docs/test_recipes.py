@@ -139,7 +139,7 @@ from modular_framework_simulation.gazebo_ros.joint_services import JointServices
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_testing.simulation.simulated_samples import jointed, run
+from modular_framework_testing.simulation.simulated_samples import hinged_model, run
 
 
 class Served:
@@ -153,7 +153,7 @@ class Served:
 
 
 world = PhysicsWorld(PhysicsSettings(1_000_000), ConvexParts(Path("parts")), (0.0, 0.0, -9.81))
-world.spawn(jointed("pendulum", 0.5))
+world.spawn(hinged_model("pendulum", 0.5))
 run(world, 0.2)
 served = Served()
 JointServices(world).connect(served)

@@ -232,13 +232,13 @@ def test_mode_planning_takes_the_parameters_that_it_reads(tmp_path: Path) -> Non
 )
 @pytest.mark.parametrize("method", ["top_down_grasps", "antipodal_grasps", "point_cloud_grasps"])
 def test_what_is_shipped_names_only_what_is_there(package: str, method: str, tmp_path: Path) -> None:
-    assert in_launch(f"method_launch_file:={method}/{method}.launch", "", package).refused(tmp_path) == ""
+    assert in_launch(f"method_launch_file:={method}/{method}.launch", "", package).refusal_text(tmp_path) == ""
 
 
 def test_unchanged_hardware_and_controllers_are_in_order(tmp_path: Path) -> None:
     (tmp_path / "config").mkdir()
-    assert in_hardware("UrArmRobotHW", "UrArmRobotHW", "").refused(tmp_path / "config") == ""
-    assert in_controllers("elbow_joint", "elbow_joint", "").refused(tmp_path) == ""
+    assert in_hardware("UrArmRobotHW", "UrArmRobotHW", "").refusal_text(tmp_path / "config") == ""
+    assert in_controllers("elbow_joint", "elbow_joint", "").refusal_text(tmp_path) == ""
 
 
 def test_hardware_that_a_package_of_ones_own_exports_is_taken() -> None:
@@ -274,8 +274,8 @@ def test_wrong_settings_of_a_planner_that_only_the_task_names_are_refused(tmp_pa
 
 def test_a_state_of_another_robot_is_no_fault(tmp_path: Path) -> None:
     case = in_config("named_joint_states.yaml", "other", {"linear_axis": 1.0}, "")
-    assert case.refused(tmp_path) == ""
+    assert case.refusal_text(tmp_path) == ""
 
 
 def test_an_own_state_with_free_options_is_in_order(tmp_path: Path) -> None:
-    assert in_script(OWN_TASK.format(name="own", option="gain: 3, "), "", OWN_STATE).refused(tmp_path) == ""
+    assert in_script(OWN_TASK.format(name="own", option="gain: 3, "), "", OWN_STATE).refusal_text(tmp_path) == ""

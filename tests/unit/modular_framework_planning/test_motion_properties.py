@@ -21,6 +21,6 @@ def test_random_motions_have_all_properties(robot: object, kind: str) -> None:
     count = int(os.environ.get("PROPERTY_PROBLEMS", SHARE[kind]))
     checker = IndependentChecker(robot.urdf, robot.srdf, package_resolver)
     tally = examine(robot.model, checker, kind, count)
-    print(f"{kind}: {tally.solved} solved, {tally.unsolved} not")
+    print(f"{kind}: {tally.solved} solved, {tally.unsolved_count} not")
     assert not tally.violations
     assert tally.solved >= LEAST_SOLVED[kind] * count, tally.refusals

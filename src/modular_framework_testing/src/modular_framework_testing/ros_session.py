@@ -118,12 +118,12 @@ class RosSession(LaunchSession):
         """
         master = rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"])
 
-        def advertised() -> bool:
+        def is_advertised() -> bool:
             with contextlib.suppress(rosgraph.MasterException, OSError):
                 return bool(master.lookupService("/" + name.lstrip("/")))
             return False
 
-        self._wait_until(advertised, timeout_s, f"service {name}")
+        self._wait_until(is_advertised, timeout_s, f"service {name}")
 
     def answers(self, node: str) -> bool:
         """Returns whether a node responds at its own interface."""
@@ -141,9 +141,9 @@ class RosSession(LaunchSession):
     def log(self) -> str:
         """Returns the output of all launches so far, and the logs of the nodes of a rostest file."""
         logs = self._suite_logs / self._run_id() if self._suite_logs else self.folder / "none"
-        return self.printed() + "".join(path.read_text(errors="replace") for path in sorted(logs.glob("*.log")))
+        return self.printed_output() + "".join(path.read_text(errors="replace") for path in sorted(logs.glob("*.log")))
 
-    def printed(self) -> str:
+    def printed_output(self) -> str:
         """Returns the output of all launches so far."""
         return "".join(launch.log() for launch in self._launches)
 

@@ -19,6 +19,6 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
     report = yield
     if report.failed:
         for number, session in enumerate(RosSession.started):
-            lines = session.printed().splitlines()[-SHOWN_LINES:]
+            lines = session.printed_output().splitlines()[-SHOWN_LINES:]
             report.sections.append((f"Output of the launches of session {number}", "\n".join(lines)))
     return report

@@ -55,7 +55,7 @@ def test_a_move_arrives_and_rests(start: tuple[float, ...], target: tuple[float,
     motion.set_command(MotionCommand(Drive.MOVE, target, velocity=2.0, acceleration=10.0))
     for _ in range(2_000):
         motion.step(DT_S, 1.0)
-        if motion.finished:
+        if motion.is_finished:
             break
     assert motion.positions == pytest.approx(target, abs=1e-4)
 

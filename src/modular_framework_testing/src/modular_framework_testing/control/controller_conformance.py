@@ -52,14 +52,14 @@ class ControllerConformance:
     @pytest.mark.parametrize("position", START_POSITIONS)
     def test_a_start_moves_no_joint(self, position: float) -> None:
         """Without a goal, each joint stays where the controller found it."""
-        loop = self._started(position)
+        loop = self._started_loop(position)
         before = self._positions(loop)
         self._run(loop, REST_S)
         np.testing.assert_allclose(self._positions(loop), before, atol=self.tolerance)
 
     def test_a_second_start_holds_the_joints_where_they_are_then(self) -> None:
         """Joints that were moved while the controller was stopped do not go back."""
-        loop = self._started(0.2)
+        loop = self._started_loop(0.2)
         self._run(loop, 0.1)
         assert loop.switch([], [NAME]) is None
         moved = [0.6 - 0.3 * index for index in range(len(self.joints))]
@@ -71,7 +71,7 @@ class ControllerConformance:
 
     def test_joints_moved_during_a_fault_stay_there_afterwards(self) -> None:
         """After a hardware fault, the controller holds the measured positions."""
-        loop = self._started(0.2)
+        loop = self._started_loop(0.2)
         self._run(loop, 0.1)
         loop.robot_hw.reason = "emergency stop"
         moved = [0.5 - 0.3 * index for index in range(len(self.joints))]
@@ -86,7 +86,7 @@ class ControllerConformance:
         """Cycles that come late in real time give the same commands, as in a slow simulation."""
         commands: list[list[list[float]]] = []
         for pause_s in (0.0, 0.005):
-            loop = self._started(0.4)
+            loop = self._started_loop(0.4)
             rows = []
             for _ in range(20):
                 time.sleep(pause_s)
@@ -97,7 +97,7 @@ class ControllerConformance:
 
     def test_an_update_does_not_block_the_loop(self) -> None:
         """The median update takes at most `MAX_MEDIAN_UPDATE_S`."""
-        loop = self._started(0.0)
+        loop = self._started_loop(0.0)
         controller = loop.controllers[NAME]
         durations_s = []
         for _ in range(100):
@@ -121,7 +121,7 @@ class ControllerConformance:
     def test_an_unloaded_controller_leaves_no_thread(self) -> None:
         """Threads that `init` starts end in `close`."""
         before = set(threading.enumerate())
-        loop = self._started(0.0)
+        loop = self._started_loop(0.0)
         self._run(loop, 0.1)
         assert loop.switch([], [NAME]) is None
         loop.manager.unload_controller(NAME)
@@ -142,7 +142,7 @@ class ControllerConformance:
         controller = {"type": TYPE, **self.parameters, **(more or {})}
         return SteppedLoop({"hw": hardware, NAME: controller}, MovableRobotHW(), types)
 
-    def _started(self, position: float) -> SteppedLoop:
+    def _started_loop(self, position: float) -> SteppedLoop:
         loop = self._loop(position)
         loop.step()
         loop.spawn(NAME)

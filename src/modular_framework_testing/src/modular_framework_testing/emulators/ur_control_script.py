@@ -87,7 +87,7 @@ class ControlScript:
     def cycle(self) -> bool:
         """Runs one cycle of the script; returns False once the script has ended."""
         if self._moving:
-            if not self._controller.motion.finished:
+            if not self._controller.motion.is_finished:
                 return True
             self._moving = False
             self._controller.motion.set_command(MotionCommand(Drive.HOLD))

@@ -123,7 +123,7 @@ class UrController:
         return command.target if command.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
 
     @property
-    def streamed(self) -> bool:
+    def is_streaming(self) -> bool:
         """Returns whether the joints follow positions streamed by a client."""
         return self.motion.command.drive is Drive.SERVO
 

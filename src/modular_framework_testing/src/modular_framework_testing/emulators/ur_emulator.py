@@ -71,7 +71,7 @@ class UrEmulator:
         self._stopping = threading.Event()
         self._log: IO[str] | None = None
         self.commands: dict[str, Callable[..., str | None]] = {
-            name.partition("_")[2]: self._locked(getattr(self, name))
+            name.partition("_")[2]: self._with_lock(getattr(self, name))
             for name in dir(self)
             if name.startswith(("inject_", "command_"))
         }
@@ -116,7 +116,7 @@ class UrEmulator:
             self._ports.close()
             self._close_log()
 
-    def _locked(self, command: Callable[..., str | None]) -> Callable[..., str | None]:
+    def _with_lock(self, command: Callable[..., str | None]) -> Callable[..., str | None]:
         def run(*arguments: object, **keywords: object) -> str | None:
             with self._lock:
                 return command(*arguments, **keywords)
@@ -272,7 +272,7 @@ class UrEmulator:
 
     def _write_log(self, log: IO[str], always: bool) -> None:
         controller = self.controller
-        if always or controller.streamed:
+        if always or controller.is_streaming:
             numbers = ",".join(f"{value:.9f}" for value in (*controller.target_positions, *controller.motion.positions))
             log.write(f"{time.time():.6f},{controller.time_s:.6f},{numbers}\n")
 

@@ -80,7 +80,7 @@ class ArmMotion:
         return max(abs(goal - position) for goal, position in zip(self.command.target, self.positions, strict=True))
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Returns whether a MOVE has reached its target or a STOP has ended at rest."""
         at_rest = max(map(abs, self.velocities)) <= _ARRIVED
         if self.command.drive is Drive.MOVE:

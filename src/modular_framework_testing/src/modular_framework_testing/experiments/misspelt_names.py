@@ -96,18 +96,18 @@ class Case:
     Attributes:
         place: File or mode with the name.
         wrong: Name or value.
-        refused: Returns the text of the refusal, given a folder for files; "" without a refusal.
+        refusal_text: Returns the text of the refusal, given a folder for files; "" without a refusal.
         words: Pattern of the refusal: the most similar name, or the allowed values.
     """
 
     place: str
     wrong: str
-    refused: Callable[[Path], str]
+    refusal_text: Callable[[Path], str]
     words: str
 
     def is_refused(self, folder: Path) -> bool:
         """Returns whether the refusal contains the pattern."""
-        return re.search(self.words, self.refused(folder), re.DOTALL) is not None
+        return re.search(self.words, self.refusal_text(folder), re.DOTALL) is not None
 
 
 @cache
@@ -127,7 +127,7 @@ def experiment_faults(content: dict[str, Any], folder: Path) -> str:
     return ""  # fmt: skip
 
 
-def changed(base: dict[str, Any], path: tuple[Any, ...], value: Any) -> dict[str, Any]:
+def changed_experiment(base: dict[str, Any], path: tuple[Any, ...], value: Any) -> dict[str, Any]:
     """Returns a copy of an experiment with a changed value.
 
     Args:
@@ -155,7 +155,7 @@ def in_experiment(base: dict[str, Any], path: tuple[Any, ...], value: Any, words
     return Case(
         f"{base['mode']}: {'.'.join(map(str, path))}",
         str(value),
-        lambda folder: experiment_faults(changed(base, path, value), folder),
+        lambda folder: experiment_faults(changed_experiment(base, path, value), folder),
         words,
     )
 
@@ -180,7 +180,7 @@ def in_launch(argument: str, words: str, package: str = "modular_framework_api")
         package: Package of the robot.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         path = roslaunch.rlutil.resolve_launch_arguments([package, "start_framework.launch"])[0]
         try:
             check_arguments(path, [argument])
@@ -188,7 +188,7 @@ def in_launch(argument: str, words: str, package: str = "modular_framework_api")
         except roslaunch.core.RLException as error:
             return str(error)
 
-    return Case("run_framework", argument, refused, words)
+    return Case("run_framework", argument, refusal_text, words)
 
 
 def in_config(file: str, key: str, value: Any, words: str) -> Case:
@@ -201,18 +201,18 @@ def in_config(file: str, key: str, value: Any, words: str) -> Case:
         words: Pattern of the refusal.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
         for path in shipped.iterdir():
             (folder / path.name).write_bytes(path.read_bytes())
         content = yaml.safe_load((folder / file).read_text())
-        (folder / file).write_text(yaml.safe_dump(changed(content, tuple(key.split("/")), value)))
-        return in_launch(f"config_directory:={folder}", "").refused(folder)
+        (folder / file).write_text(yaml.safe_dump(changed_experiment(content, tuple(key.split("/")), value)))
+        return in_launch(f"config_directory:={folder}", "").refusal_text(folder)
 
-    return Case(file, f"{key}: {value}", refused, words)
+    return Case(file, f"{key}: {value}", refusal_text, words)
 
 
-def _replaced(text: str, old: str, new: str) -> str:
+def _replace_first(text: str, old: str, new: str) -> str:
     """Returns a text with its first occurrence of `old` replaced, which must exist."""
     assert old in text, old
     return text.replace(old, new, 1)
@@ -227,18 +227,18 @@ def in_hardware(old: str, new: str, words: str) -> Case:
         words: Pattern of the refusal.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
         for path in shipped.iterdir():
             (folder / path.name).write_bytes(path.read_bytes())
         text = (folder / "connection_hardware.yaml").read_text()
-        (folder / "connection_hardware.yaml").write_text(_replaced(text, old, new))
+        (folder / "connection_hardware.yaml").write_text(_replace_first(text, old, new))
         path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
         arguments = [f"config_directory:={folder}", "simulation:=false", "task_constructor_script:=pick_and_hold.yaml"]
         check_arguments(path, arguments)
         return "\n".join(launch_faults(path, arguments))
 
-    return Case("connection_hardware.yaml", new, refused, words)
+    return Case("connection_hardware.yaml", new, refusal_text, words)
 
 
 def in_controllers(old: str, new: str, words: str) -> Case:
@@ -250,11 +250,11 @@ def in_controllers(old: str, new: str, words: str) -> Case:
         words: Pattern of the refusal.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         package = Path(rospkg.RosPack().get_path("ur5_ezgripper_robot"))
         text = (package / "controllers" / "ur5_ezgripper_controller_simulation.yaml").read_text()
         (folder / "controllers").mkdir()
-        (folder / "controllers" / "mine.yaml").write_text(_replaced(text, old, new))
+        (folder / "controllers" / "mine.yaml").write_text(_replace_first(text, old, new))
         (folder / "package.xml").write_text("<package><name>my_robot</name></package>")
         spawner = LaunchedNode("modular_framework_core", "robot_controllers_spawner", "/s", "/", "my_robot mine.yaml")
         joints = (*yaml.safe_load(text)["arm_trajectory_controller"]["joints"], "ezgripper_knuckle_palm_L1_1")
@@ -265,7 +265,7 @@ def in_controllers(old: str, new: str, words: str) -> Case:
         finally:
             os.environ["ROS_PACKAGE_PATH"] = before
 
-    return Case("controller file", new, refused, words)
+    return Case("controller file", new, refusal_text, words)
 
 
 def in_task(old: str, new: str, words: str, parameters: dict[str, Any] | None = None) -> Case:
@@ -278,14 +278,14 @@ def in_task(old: str, new: str, words: str, parameters: dict[str, Any] | None = 
         parameters: ROS parameters of the experiment besides those of TASK.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         path = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
         text = (path / "pick_and_hold.yaml").read_text()
-        (folder / "task.yaml").write_text(_replaced(text, old, new))
+        (folder / "task.yaml").write_text(_replace_first(text, old, new))
         own = {**TASK["parameters"], **(parameters or {})}
         return experiment_faults({**TASK, "task": "task.yaml", "parameters": own}, folder)
 
-    return Case("task of an experiment", new, refused, words)
+    return Case("task of an experiment", new, refusal_text, words)
 
 
 def in_script(text: str, words: str, state: str = "") -> Case:
@@ -297,7 +297,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
         state: Module of the state; "" for none.
     """
 
-    def refused(folder: Path) -> str:
+    def refusal_text(folder: Path) -> str:
         (folder / "own.yaml").write_text(text)
         (folder / "states").mkdir()
         if state:
@@ -307,7 +307,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
             code = pipeline.main([str(folder / "own.yaml"), str(folder / "states"), "--check"], installed_planners)
         return printed.getvalue() if code else ""
 
-    return Case("task script", text.split("\n")[0][:40], refused, words)
+    return Case("task script", text.split("\n")[0][:40], refusal_text, words)
 
 
 IK = "/robot_description_kinematics"

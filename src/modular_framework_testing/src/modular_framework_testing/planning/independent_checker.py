@@ -376,10 +376,10 @@ class IndependentChecker:
             rest: Positions of the other joints, by name.
             step: Maximum difference of a joint between samples [rad or m].
         """
-        return len(self.touching_pairs(joint_names, sampled(path, step), rest))
+        return len(self.touching_pairs(joint_names, sampled_states(path, step), rest))
 
 
-def sampled(path: np.ndarray, step: float) -> np.ndarray:
+def sampled_states(path: np.ndarray, step: float) -> np.ndarray:
     """Returns states on the straight pieces of a path, vertices included, at most `step` apart in every joint."""
     rows = []
     for start, end in zip(path[:-1], path[1:], strict=True):

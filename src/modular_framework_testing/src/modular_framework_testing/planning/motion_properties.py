@@ -62,7 +62,7 @@ class Tally:
     refusals: Counter[str] = field(default_factory=Counter)
 
     @property
-    def unsolved(self) -> int:
+    def unsolved_count(self) -> int:
         return self.refusals.total()
 
 

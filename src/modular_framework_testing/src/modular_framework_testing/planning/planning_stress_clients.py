@@ -183,9 +183,9 @@ class Judge:
         """
         self._checker, self._rest, self._step = checker, rest, step
         line, wall = np.array([START, [START[0] + WAY, *START[1:]]]), wall_at(WAY / 2, "wall")
-        assert not self._touched(line, {}) and self._touched(line, {"wall": wall}) == {"wall"}
+        assert not self._touched_objects(line, {}) and self._touched_objects(line, {"wall": wall}) == {"wall"}
 
-    def _touched(self, points: np.ndarray, objects: dict[str, CollisionObject]) -> set[str]:
+    def _touched_objects(self, points: np.ndarray, objects: dict[str, CollisionObject]) -> set[str]:
         return touched_bodies(self._checker, ARM, points, self._rest, objects, step=self._step)
 
     def fault(self, answer: Answer, world: World) -> str:
@@ -199,7 +199,7 @@ class Judge:
         if not np.allclose(answer.points[0], START, atol=1e-6):
             return f"{answer.kind}: does not begin where the robot is"
         objects = world.objects_between(answer.begun, answer.ended)
-        touched = self._touched(answer.points, objects | {item.id: item for item in answer.walls})
+        touched = self._touched_objects(answer.points, objects | {item.id: item for item in answer.walls})
         if touched - objects.keys():
             return f"{answer.kind}: the motion touches {', '.join(sorted(touched - objects.keys()))}"
         if not world.was_free_of(touched, answer.begun, answer.ended):

@@ -274,11 +274,11 @@ def report_of(work: Callable[[], Any], *kinds: str) -> tuple[Any, dict[str, Any]
     heard, begun = reports().heard, rospy.get_time()
     result = work()
 
-    def caused() -> list[dict[str, Any]]:
+    def caused_reports() -> list[dict[str, Any]]:
         return [item for item in heard if item["time"] >= begun and (not kinds or item["kind"] in kinds)]
 
-    until(caused, "a planning report")
-    return result, caused()[-1]
+    until(caused_reports, "a planning report")
+    return result, caused_reports()[-1]
 
 
 def joint_goal(name: str, value: float) -> Constraints:

@@ -11,7 +11,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
-from modular_framework_testing.simulation.simulated_samples import jointed, run
+from modular_framework_testing.simulation.simulated_samples import hinged_model, run
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 G = 9.81
@@ -113,7 +113,9 @@ def slide(make: MakeWorld) -> Outcome:
     return Outcome(body.state().pose.position[0] - begin[0], speed**2 / (2 * mu * G))
 
 
-def rolled(make: MakeWorld, shape: specs.Geometry, moments: Vector3, turn: Vector3, inertia_ratio: float) -> Outcome:
+def roll_down_slope(
+    make: MakeWorld, shape: specs.Geometry, moments: Vector3, turn: Vector3, inertia_ratio: float
+) -> Outcome:
     """Measures the distance down a slope of 10 degrees in one second.
 
     Args:
@@ -137,15 +139,15 @@ def roll_cylinder(make: MakeWorld) -> Outcome:
     """A cylinder rolls down a slope with two thirds of the acceleration of sliding."""
     across, along = 1 * (3 * 0.05**2 + 0.1**2) / 12, 0.05**2 / 2
     shape = specs.Cylinder(0.05, 0.1)
-    return rolled(make, shape, (across, across, along), (math.pi / 2, 0, 0), 0.5)
+    return roll_down_slope(make, shape, (across, across, along), (math.pi / 2, 0, 0), 0.5)
 
 
 def roll_ball(make: MakeWorld) -> Outcome:
     """A ball rolls down a slope with five sevenths of the acceleration of sliding."""
-    return rolled(make, specs.Sphere(0.05), (0.4 * 0.05**2,) * 3, (0, 0, 0), 0.4)
+    return roll_down_slope(make, specs.Sphere(0.05), (0.4 * 0.05**2,) * 3, (0, 0, 0), 0.4)
 
 
-def bounced(make: MakeWorld, shape: specs.Geometry, half: float, moment: float) -> Outcome:
+def bounce_on_floor(make: MakeWorld, shape: specs.Geometry, half: float, moment: float) -> Outcome:
     """Measures the ratio of the velocities after and before an impact with restitution 0.8.
 
     Args:
@@ -171,18 +173,18 @@ def bounced(make: MakeWorld, shape: specs.Geometry, half: float, moment: float) 
 
 def bounce_ball(make: MakeWorld) -> Outcome:
     """A ball of restitution 0.8 leaves with 0.8 of its velocity."""
-    return bounced(make, specs.Sphere(0.05), 0.05, 0.4 * 0.05**2)
+    return bounce_on_floor(make, specs.Sphere(0.05), 0.05, 0.4 * 0.05**2)
 
 
 def bounce_box(make: MakeWorld) -> Outcome:
     """A box of restitution 0.8 that falls flat leaves with 0.8 of its velocity."""
-    return bounced(make, specs.Box((0.1, 0.1, 0.1)), 0.05, 0.1**2 / 6)
+    return bounce_on_floor(make, specs.Box((0.1, 0.1, 0.1)), 0.05, 0.1**2 / 6)
 
 
 def pendulum(make: MakeWorld) -> Outcome:
     """A pendulum has the period 2 pi sqrt(I / (m g l)) (1 + a^2 / 16)."""
     world, length, amplitude = make(), 0.4, 0.1
-    body = world.spawn(jointed("pendulum", length, pose=Pose((0, 0, 2))))
+    body = world.spawn(hinged_model("pendulum", length, pose=Pose((0, 0, 2))))
     body.set_joints({"hinge": math.pi / 2 - amplitude})
     crossings: list[float] = []
     step_s, before = world.settings.time_step_s, 0.0

@@ -68,7 +68,7 @@ def solid(
     return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (collision,), ()),), (), "test")
 
 
-def jointed(
+def hinged_model(
     name: str,
     length: float,
     dynamics: specs.JointDynamics = specs.JointDynamics(),  # noqa: B008  (frozen)
