@@ -63,7 +63,7 @@ class JointValues:
         """
         joint = self._joints.free[name]
         with self._lock:
-            self._positions[name] = joint.shown(position)
+            self._positions[name] = joint.shown_position(position)
             self._positions_known = True
 
     def centre(self) -> None:
@@ -86,11 +86,11 @@ class JointValues:
             for name, joint in self._joints.free.items():
                 position = self._positions[name] + (step if self._forward[name] else -step)
                 if joint.continuous:
-                    self._positions[name] = joint.shown(position)
+                    self._positions[name] = joint.shown_position(position)
                     continue
                 if not joint.lower <= position <= joint.upper:
                     self._forward[name] = not self._forward[name]
-                self._positions[name] = joint.shown(position)
+                self._positions[name] = joint.shown_position(position)
 
     def receive(
         self, names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], efforts: Sequence[float]

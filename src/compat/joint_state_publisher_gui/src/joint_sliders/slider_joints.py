@@ -62,7 +62,7 @@ class SliderJoint:
         limits = f"{self.lower:.{DECIMALS}f} to {self.upper:.{DECIMALS}f} {self.unit}"
         return f"{limits}, continuous" if self.continuous else limits
 
-    def shown(self, position: float) -> float:
+    def shown_position(self, position: float) -> float:
         """Returns the position clamped to the limits; a position of a continuous joint is wrapped to -pi..pi."""
         if self.continuous and not self.lower <= position <= self.upper:
             position = math.remainder(position, math.tau)

@@ -50,7 +50,7 @@ class JointRow:
 
     def show(self, position: float) -> None:
         """Displays a position [rad or m] without emitting `valueChanged`."""
-        position = self.joint.shown(position)
+        position = self.joint.shown_position(position)
         fraction = (position - self.joint.lower) / (self.joint.upper - self.joint.lower)
         for widget, value in ((self.spin_box, position), (self.slider, round(fraction * TICKS))):
             widget.blockSignals(True)

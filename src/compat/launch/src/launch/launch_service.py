@@ -168,12 +168,12 @@ class LaunchService:
         self._report_starts(running)
         if exit_code != 0:
             self._failed.append(running.request.name)
-        self.emit_event(ProcessExited(*_described(running), returncode=exit_code))
+        self.emit_event(ProcessExited(*_process_description(running), returncode=exit_code))
 
     def _report_starts(self, running: Any) -> None:
         while running.seen_starts < running.process.spawn_count:
             running.seen_starts += 1
-            self.emit_event(ProcessStarted(*_described(running)))
+            self.emit_event(ProcessStarted(*_process_description(running)))
 
     def _handle_events(self, shutdown_when_idle: bool) -> None:
         while not self.context.is_shutdown:
@@ -253,7 +253,7 @@ class LaunchService:
                 self._session.stop(running)
 
 
-def _described(running: Any) -> tuple[Any, str, list[str], int, str | None, dict[str, str]]:
+def _process_description(running: Any) -> tuple[Any, str, list[str], int, str | None, dict[str, str]]:
     request = running.request
     return (
         request.action,

@@ -109,7 +109,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
         """
         if not values and not cleared:
             return
-        master = self._connected().config.master
+        master = self._connected_parent().config.master
         calls = master.get_multi()
         present = [name for name in cleared if master.get().hasParam(CALLER, name)[2]]
         for name in present:
@@ -122,7 +122,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
 
     def parameter(self, name: str) -> Any:
         """Returns a value of the parameter server; None if the parameter is not set."""
-        code, _, value = self._connected().config.master.get().getParam(CALLER, name)
+        code, _, value = self._connected_parent().config.master.get().getParam(CALLER, name)
         return value if code == 1 else None
 
     def start(self, request: ProcessRequest) -> RunningProcess:
@@ -131,7 +131,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
         Raises:
             LaunchError: The program does not exist or cannot be executed.
         """
-        parent = self._connected()
+        parent = self._connected_parent()
         try:
             process = self._process_of(request)
             running = RunningProcess(request, process)
@@ -170,13 +170,13 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
             with self._lock:
                 self._running.pop(process_name, None)
 
-    def _connected(self) -> roslaunch.parent.ROSLaunchParent:
+    def _connected_parent(self) -> roslaunch.parent.ROSLaunchParent:
         if self._parent is None:
             raise LaunchError("call connect() before setting parameters or starting processes")
         return self._parent
 
     def _process_of(self, request: ProcessRequest) -> Any:
-        uri = self._connected().config.master.uri
+        uri = self._connected_parent().config.master.uri
         if request.roslaunch_node is not None:
             node = request.roslaunch_node
             node.machine = roslaunch.core.local_machine()

@@ -56,10 +56,10 @@ def evaluate_sources(context: LaunchContext, parameters: Any) -> list[ParameterS
     """
     if isinstance(parameters, str | Mapping):
         raise LaunchError(f"parameters is {type(parameters).__name__}; allowed: a list of dicts and files, [...]")
-    return [_evaluated(context, entry) for entry in parameters]
+    return [_evaluated_source(context, entry) for entry in parameters]
 
 
-def _evaluated(context: LaunchContext, entry: Any) -> ParameterSource:
+def _evaluated_source(context: LaunchContext, entry: Any) -> ParameterSource:
     if isinstance(entry, Mapping):
         values = {
             perform_text(context, key): evaluate_value(context, value, None, f"parameter {perform_text(context, key)}")

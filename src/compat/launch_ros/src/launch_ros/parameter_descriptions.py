@@ -138,7 +138,7 @@ def evaluate_value(context: LaunchContext, value: Any, value_type: Any, label: s
     if isinstance(value, ParameterValue):
         return value.evaluate(context)
     if isinstance(value, Substitution) or _is_single_text(value):
-        return _parsed(perform_text(context, value), value_type, label)
+        return _parsed_value(perform_text(context, value), value_type, label)
     if isinstance(value, Mapping):
         return {
             perform_text(context, key): evaluate_value(context, inner, None, f"{label}/{key}")
@@ -147,8 +147,8 @@ def evaluate_value(context: LaunchContext, value: Any, value_type: Any, label: s
     if isinstance(value, list | tuple):
         return _with_uniform_type([evaluate_value(context, inner, None, label) for inner in value])
     if value_type is not None and isinstance(value, str):
-        return _parsed(value, value_type, label)
-    return _converted(value, value_type, label) if value_type is not None else value
+        return _parsed_value(value, value_type, label)
+    return _converted_value(value, value_type, label) if value_type is not None else value
 
 
 def _is_single_text(value: Any) -> bool:
@@ -167,7 +167,7 @@ def _with_uniform_type(values: list[Any]) -> list[Any]:
     return values
 
 
-def _parsed(text: str, value_type: Any, label: str) -> Any:
+def _parsed_value(text: str, value_type: Any, label: str) -> Any:
     """Parses a text as a value."""
     if value_type is str:
         return text
@@ -181,7 +181,7 @@ def _parsed(text: str, value_type: Any, label: str) -> Any:
             "ParameterValue(..., value_type=str)"
         ) from None
     if value_type is not None:
-        return _converted(value, value_type, label)
+        return _converted_value(value, value_type, label)
     if value is None or isinstance(value, Mapping):
         raise LaunchError(
             f"{label} is {_short(text)}, which YAML parses as {'nothing' if value is None else 'a mapping'}; to keep "
@@ -190,12 +190,12 @@ def _parsed(text: str, value_type: Any, label: str) -> Any:
     return value
 
 
-def _converted(value: Any, value_type: Any, label: str) -> Any:
+def _converted_value(value: Any, value_type: Any, label: str) -> Any:
     """Converts a value to a type."""
     if typing.get_origin(value_type) is list:
         inner = typing.get_args(value_type)[0]
         if isinstance(value, list | tuple):
-            return [_converted(each, inner, label) for each in value]
+            return [_converted_value(each, inner, label) for each in value]
     elif value_type not in SCALARS:
         names = ", ".join(each.__name__ for each in SCALARS)
         raise LaunchError(f"{label}: value_type is {value_type!r}; allowed: {names}, and lists of these (List[float])")

@@ -72,7 +72,7 @@ def hardware_plan(
         raise LaunchError(str(error)) from None
     if any(tag.is_simulated for tag in tags):
         return _simulation(tags, namespace)
-    described = [part for tag in tags for part in _parts(tag)]
+    described = [part for tag in tags for part in _hardware_parts(tag)]
     if not described:
         joints = _joints_of_description(urdf, lookup(full_name(namespace, f"{DESCRIPTION}_semantic"))) if urdf else []
         described = [("mock", _mock(joints or _joints_of_controllers(controllers), ("position",)))]
@@ -101,7 +101,7 @@ def _simulation(tags: Iterable[Ros2ControlHardware], namespace: str) -> Hardware
     return HardwarePlan({name: value for tag in tags for name, value in tag.parameters.items()}, simulated=True)
 
 
-def _parts(hardware: Ros2ControlHardware) -> list[tuple[str, dict[str, Any]]]:
+def _hardware_parts(hardware: Ros2ControlHardware) -> list[tuple[str, dict[str, Any]]]:
     """Returns the ROS 1 hardware of a tag, by name; mock hardware is split, because it has one command interface."""
     name = re.sub(r"\W", "_", hardware.name) or "hardware"
     if hardware.plugin not in MOCK_PLUGINS:

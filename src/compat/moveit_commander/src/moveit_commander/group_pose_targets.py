@@ -39,7 +39,7 @@ class GroupPoseTargets(GroupJointTargets):
         link = self._link(end_effector_link, "set poses for")
         if not poses:
             raise MoveItCommanderException("Unable to set target poses: the list is empty")
-        self._pose_targets[link] = [self._stamped(pose) for pose in poses]
+        self._pose_targets[link] = [self._stamped_pose(pose) for pose in poses]
         self._active_target = Target.POSE
 
     def set_position_target(self, xyz: Sequence[float], end_effector_link: str = "") -> None:
@@ -47,7 +47,7 @@ class GroupPoseTargets(GroupJointTargets):
         link = self._link(end_effector_link, "set the pose for")
         if len(xyz) != 3:
             raise MoveItCommanderException(f"Expected [x, y, z]; got {len(xyz)} numbers")
-        self._pose_targets[link] = [self._stamped([*xyz, 0.0, 0.0, 0.0, 1.0])]
+        self._pose_targets[link] = [self._stamped_pose([*xyz, 0.0, 0.0, 0.0, 1.0])]
         self._active_target = Target.POSITION
 
     def set_orientation_target(self, q: Sequence[float], end_effector_link: str = "") -> None:
@@ -55,7 +55,7 @@ class GroupPoseTargets(GroupJointTargets):
         link = self._link(end_effector_link, "set the pose for")
         if len(q) != 4:
             raise MoveItCommanderException(f"Expected [qx, qy, qz, qw]; got {len(q)} numbers")
-        pose = self._stamped(Pose(Point(), Quaternion(*(float(value) for value in q))))
+        pose = self._stamped_pose(Pose(Point(), Quaternion(*(float(value) for value in q))))
         self._pose_targets[link] = [pose]
         self._active_target = Target.ORIENTATION
 
@@ -128,7 +128,7 @@ class GroupPoseTargets(GroupJointTargets):
                     goal.orientation_constraints.append(orientation_goal(link, pose, self._orientation_tolerance))
         return goals
 
-    def _stamped(self, pose: Any) -> PoseStamped:
+    def _stamped_pose(self, pose: Any) -> PoseStamped:
         if isinstance(pose, PoseStamped):
             stamped = PoseStamped(pose=pose.pose)
             stamped.header.frame_id = pose.header.frame_id or self.get_pose_reference_frame()

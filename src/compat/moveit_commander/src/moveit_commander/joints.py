@@ -121,7 +121,7 @@ def is_quaternion(variable: Joint) -> bool:
 def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
     """Returns a joint of the URDF with its limits; raises RobotModelError for invalid numbers."""
     try:
-        return _limited(joint, limits.get(joint.name) or {})
+        return _with_limits(joint, limits.get(joint.name) or {})
     except (ValueError, TypeError, AttributeError) as error:
         raise RobotModelError(
             f"URDF joint '{joint.name}' or its entry in joint_limits.yaml: {error}; numbers and the "
@@ -129,7 +129,7 @@ def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
         ) from error
 
 
-def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
+def _with_limits(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
     """Returns a joint with the limits of the description, overridden by its entry in joint_limits.yaml."""
     is_endless = joint.kind == "continuous"
     limits, _ = overwritten(joint.name, described_limits(joint), entry, is_endless)

@@ -130,7 +130,7 @@ class ActionCaller:
         begun = seen = time.monotonic()
         while not done.wait(POLL_PERIOD_S):
             now = time.monotonic()
-            seen = now if is_connected(self._client) and not self._ended() else seen
+            seen = now if is_connected(self._client) and not self._has_ended() else seen
             if rospy.is_shutdown():
                 raise ServerError(f"action {self.name}: this node is shut down before the result came")
             if now - begun > timeout_s:
@@ -155,7 +155,7 @@ class ActionCaller:
             self._client.cancel_goal()
             raise ServerError(f"action {self.name} does not answer: {frozen}")
 
-    def _ended(self) -> bool:
+    def _has_ended(self) -> bool:
         """Returns whether the goal has ended on the server while its result has not arrived."""
         handle = self._client.gh
         return handle is not None and handle.get_comm_state() == CommState.WAITING_FOR_RESULT

@@ -69,11 +69,11 @@ class MoveItConfigsBuilder(ParameterBuilder):
         own = CONFIG / f"{robot_name}.urdf.xacro"
         self._own_urdf: Path | None = own if (self._package_path / own).is_file() else None
         if self._own_urdf is None and not self._setup.urdf_path:
-            self._own_urdf = self._guessed(f"{robot_name}.urdf", "URDF", own)
-        self._srdf = Path(self._setup.srdf_path or self._guessed(f"{robot_name}.srdf", "SRDF"))
+            self._own_urdf = self._expected_path(f"{robot_name}.urdf", "URDF", own)
+        self._srdf = Path(self._setup.srdf_path or self._expected_path(f"{robot_name}.srdf", "SRDF"))
         self._urdf_mappings: dict[Any, Any] = {}
 
-    def _guessed(self, name: str, kind: str, looked_for: Path | None = None) -> Path:
+    def _expected_path(self, name: str, kind: str, looked_for: Path | None = None) -> Path:
         """Returns the expected path of a file that is not named anywhere, and logs the searched locations."""
         places = [*([str(looked_for)] if looked_for else []), f"section {kind} of {FILE_NAME}"]
         LOGGER.warning(
@@ -105,7 +105,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         arguments = self._urdf_mappings or dict(self._setup.xacro_arguments)
         self._yaml.arguments.update(_known_texts(arguments))
         try:
-            text = _expanded(path, arguments)
+            text = _expanded_xacro(path, arguments)
         except ParameterBuilderFileNotFoundError as error:
             LOGGER.warning(
                 "%s; the robot description is not loaded: another node has to set the parameter %s",
@@ -132,7 +132,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         arguments = _texts(mappings or {}) or _known_texts(self._urdf_mappings)
         if not mappings and not self._urdf_mappings:
             arguments = {**self._yaml.xacro_arguments(path.name), **self._setup.xacro_arguments}
-        self._configs.robot_description_semantic = {f"{self._description}_semantic": _expanded(path, arguments)}
+        self._configs.robot_description_semantic = {f"{self._description}_semantic": _expanded_xacro(path, arguments)}
         return self
 
     def robot_description_kinematics(self, file_path: Path | str | None = None) -> Self:
@@ -299,7 +299,7 @@ def _if_present(load: Callable[[], object], consequence: str) -> None:
         LOGGER.warning("%s; %s", error, consequence)
 
 
-def _expanded(path: Path, mappings: Mappings) -> Any:
+def _expanded_xacro(path: Path, mappings: Mappings) -> Any:
     """Returns the expanded text of a xacro file, or a value that is expanded during the launch.
 
     The expansion is deferred if an argument is a launch substitution.

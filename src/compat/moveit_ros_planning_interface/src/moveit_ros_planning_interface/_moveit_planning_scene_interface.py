@@ -45,15 +45,15 @@ class PlanningSceneInterface:
 
     def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, bytes]:
         """Returns geometry_msgs/Pose of objects by name."""
-        return _serialized(self._scene.get_object_poses(object_ids))
+        return _serialized_messages(self._scene.get_object_poses(object_ids))
 
     def get_objects(self, object_ids: Sequence[str] = ()) -> dict[str, bytes]:
         """Returns moveit_msgs/CollisionObject by name; all world objects if no name is given."""
-        return _serialized(self._scene.get_objects(object_ids))
+        return _serialized_messages(self._scene.get_objects(object_ids))
 
     def get_attached_objects(self, object_ids: Sequence[str] = ()) -> dict[str, bytes]:
         """Returns moveit_msgs/AttachedCollisionObject by name; all attached objects if no name is given."""
-        return _serialized(self._scene.get_attached_objects(object_ids))
+        return _serialized_messages(self._scene.get_attached_objects(object_ids))
 
     def get_planning_scene(self, components: int) -> bytes:
         """Returns a moveit_msgs/PlanningScene with the components given as bits of PlanningSceneComponents."""
@@ -69,5 +69,5 @@ class PlanningSceneInterface:
         return True
 
 
-def _serialized(messages: Mapping[str, Any]) -> dict[str, bytes]:
+def _serialized_messages(messages: Mapping[str, Any]) -> dict[str, bytes]:
     return {name: write(message) for name, message in messages.items()}

@@ -55,7 +55,7 @@ class Container(State):
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
         """Sets the initial states, and adds values to the local userdata."""
-        raise self._unsupported("set_initial_state")
+        raise self._unsupported_error("set_initial_state")
 
     def get_active_states(self) -> list[str]:
         """Returns the labels of the running states."""
@@ -67,13 +67,13 @@ class Container(State):
 
     def check_consistency(self) -> None:
         """Raises an error if the container is incomplete or inconsistent."""
-        raise self._unsupported("check_consistency")
+        raise self._unsupported_error("check_consistency")
 
     def is_running(self) -> bool:
         """Returns whether the container is executing."""
         return self._running
 
-    def _unsupported(self, method: str) -> InvalidConstructionError:
+    def _unsupported_error(self, method: str) -> InvalidConstructionError:
         return InvalidConstructionError(f"{type(self).__name__} does not define {method}")
 
     # ---- construction --------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ class _ItemsAsAttributes:
         try:
             return self[name]  # type: ignore[index]
         except KeyError:
-            raise AttributeError(self._missing(name)) from None
+            raise AttributeError(self._missing_key_text(name)) from None
 
 
 class UserData(_ItemsAsAttributes):
@@ -81,7 +81,7 @@ class UserData(_ItemsAsAttributes):
         with self._lock:
             self._data[key] = item
 
-    def _missing(self, name: str) -> str:
+    def _missing_key_text(self, name: str) -> str:
         return f"userdata has no key '{name}'; it has: {sorted(self.keys())}"
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -190,7 +190,7 @@ class Remapper(_ItemsAsAttributes):
     def __contains__(self, key: object) -> bool:
         return isinstance(key, str) and key in self._input_keys and self._remap(key) in self._ud
 
-    def _missing(self, name: str) -> str:
+    def _missing_key_text(self, name: str) -> str:
         return f"userdata key '{name}' has no value yet (it is called '{self._remap(name)}' in the container)"
 
     def __setattr__(self, name: str, value: Any) -> None:

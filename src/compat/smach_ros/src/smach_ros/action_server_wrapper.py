@@ -72,9 +72,9 @@ class ActionServerWrapper:
         self._goal_key, self._feedback_key, self._result_key = goal_key, feedback_key, result_key
         self._expand_goal_slots, self._pack_result_slots = expand_goal_slots, pack_result_slots
         self._new_goal_data(None)
-        self._goal_slots_map = self._checked("goal_slots_map", goal_key, goal_slots_map)
-        self._feedback_slots_map = self._checked("feedback_slots_map", feedback_key, feedback_slots_map)
-        self._result_slots_map = self._checked("result_slots_map", result_key, result_slots_map)
+        self._goal_slots_map = self._checked_slots_map("goal_slots_map", goal_key, goal_slots_map)
+        self._feedback_slots_map = self._checked_slots_map("feedback_slots_map", feedback_key, feedback_slots_map)
+        self._result_slots_map = self._checked_slots_map("result_slots_map", result_key, result_slots_map)
         self._succeeded_outcomes = frozenset(succeeded_outcomes)
         self._aborted_outcomes = frozenset(aborted_outcomes)
         self._preempted_outcomes = frozenset(preempted_outcomes)
@@ -97,7 +97,7 @@ class ActionServerWrapper:
         self.userdata[self._feedback_key] = empty[1]
         self.userdata[self._result_key] = empty[2]
 
-    def _checked(self, label: str, key: str, slots_map: Mapping[str, str] | None) -> dict[str, str]:
+    def _checked_slots_map(self, label: str, key: str, slots_map: Mapping[str, str] | None) -> dict[str, str]:
         message = self.userdata[key]
         unknown = [slot for slot in slots_map or {} if slot not in message.__slots__]
         if unknown:

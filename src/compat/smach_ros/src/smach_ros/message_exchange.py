@@ -153,7 +153,7 @@ class MessageSource(_MessageRules):
         self._empty = empty
         if fixed is not None and not self._fits(fixed):
             raise smach.InvalidStateError(
-                f"{what} is a {_kind(fixed)}; give a {empty._type}, or a function as {what}_cb"
+                f"{what} is a {_type_name(fixed)}; give a {empty._type}, or a function as {what}_cb"
             )
         self._fixed = empty if fixed is None else fixed
 
@@ -187,13 +187,15 @@ class MessageSource(_MessageRules):
 
     def _check(self, message: Any, origin: str) -> None:
         if not self._fits(message):
-            raise ExchangeError(f"{origin} gave a {_kind(message)} as {self._what}; it must be a {self._empty._type}")
+            raise ExchangeError(
+                f"{origin} gave a {_type_name(message)} as {self._what}; it must be a {self._empty._type}"
+            )
 
     def _fits(self, message: Any) -> bool:
         return getattr(message, "_type", None) == self._empty._type
 
 
-def _kind(value: Any) -> str:
+def _type_name(value: Any) -> str:
     return str(getattr(value, "_type", type(value).__name__))
 
 
@@ -259,7 +261,7 @@ class ServerCallState(smach.State):
         source.register_on(self)
         sink.register_on(self)
 
-    def _stopped(self) -> bool:
+    def _is_stopped(self) -> bool:
         return self.preempt_requested() or going_down()
 
     def _wait_for_server(
@@ -277,7 +279,7 @@ class ServerCallState(smach.State):
             ExchangeError: The server did not appear in time.
         """
         limit, next_warning = WallTimeLimit(limit_s), WallTimeLimit(1.0)
-        while not self._stopped():
+        while not self._is_stopped():
             if is_available():
                 return True
             if limit.over():
@@ -292,7 +294,7 @@ class ServerCallState(smach.State):
         smach.logerr(reason)
         return "aborted"
 
-    def _preempted(self, reason: str) -> str:
+    def _preempt_with(self, reason: str) -> str:
         self.reason = reason
         smach.loginfo(reason)
         self.service_preempt()

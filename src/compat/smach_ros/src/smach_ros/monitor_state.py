@@ -73,19 +73,19 @@ class MonitorState(smach.State):
         self._verdict = None
         self._wake.clear()
         if self.preempt_requested():
-            return self._preempted()
+            return self._handle_preempt()
         limit = RosTimeLimit(self._timeout_s)
         subscriber = rospy.Subscriber(self._topic, self._msg_type, self._check, callback_args=userdata)
         try:
             while self._verdict is None:
                 if self.preempt_requested() or going_down():
-                    return self._preempted()
+                    return self._handle_preempt()
                 if limit.over():
                     self._decide("invalid", f"no decision from '{self._topic}' within {self._timeout_s} s")
                 self._wake.wait(POLL_PERIOD_S)
         finally:
             subscriber.unregister()
-        return self._preempted() if self.preempt_requested() else self._verdict
+        return self._handle_preempt() if self.preempt_requested() else self._verdict
 
     def _check(self, message: Any, userdata: Any) -> None:
         """Evaluates the condition for a message; the first decision is final."""
@@ -110,7 +110,7 @@ class MonitorState(smach.State):
         self._verdict = verdict
         self._wake.set()
 
-    def _preempted(self) -> str:
+    def _handle_preempt(self) -> str:
         self.reason = f"stopped while monitoring '{self._topic}'"
         self.service_preempt()
         return "preempted"

@@ -93,16 +93,16 @@ class ServiceState(ServerCallState):
                 "it was not advertised",
             ):
                 proxy, request = rospy.ServiceProxy(self._service_name, self._service_spec), self._source.make(userdata)
-                if not self._stopped():
-                    response = call_service(proxy, request, self._exec_timeout_s, self._stopped)
+                if not self._is_stopped():
+                    response = call_service(proxy, request, self._exec_timeout_s, self._is_stopped)
                     chosen = self._sink.deliver(userdata, self.get_registered_outcomes(), response)
                     return "succeeded" if chosen is None else chosen
         except ExchangeError as error:
             return self._abort(f"service '{self._service_name}': {error}")
         except CallError as error:
-            if not self._stopped():
+            if not self._is_stopped():
                 return self._abort(str(error))
-        return self._preempted(f"service '{self._service_name}': stopped before it responded")
+        return self._preempt_with(f"service '{self._service_name}': stopped before it responded")
 
 
 def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:

@@ -124,11 +124,11 @@ class SimpleActionState(ServerCallState):
                 self._server_wait_timeout_s,
                 f"no server of type {self._action_spec._type} was at '{rospy.resolve_name(self._action_name)}'",
             ):
-                return self._preempted(f"action '{self._action_name}': stopped before the goal was sent")
+                return self._preempt_with(f"action '{self._action_name}': stopped before the goal was sent")
             goal = self._source.make(userdata)
             with self._lock:  # orders a request to stop either before this block or after the goal is active
                 if self.preempt_requested():
-                    return self._preempted(f"action '{self._action_name}': stopped before the goal was sent")
+                    return self._preempt_with(f"action '{self._action_name}': stopped before the goal was sent")
                 client = self._connect()
                 client.send_goal(goal, done_cb=lambda status, result: self._wake.set())
                 self._goal_is_out = True
@@ -166,7 +166,7 @@ class SimpleActionState(ServerCallState):
         lost = WallTimeLimit(SERVER_LOST_S)
         cancelled: WallTimeLimit | None = None
         too_late = ""
-        while not _ended(client):
+        while not _has_ended(client):
             if cancelled is None and (self.preempt_requested() or smach.is_shutdown() or limit.over()):
                 if not (self.preempt_requested() or smach.is_shutdown()):
                     too_late = f"was not done within {self._exec_timeout_s} s"
@@ -192,8 +192,8 @@ class SimpleActionState(ServerCallState):
         if status == GoalStatus.SUCCEEDED:
             return "succeeded"
         detail = f": {text}" if text else ""
-        if status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) and self._stopped():
-            return self._preempted(f"action '{self._action_name}': the goal was stopped{detail}")
+        if status in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) and self._is_stopped():
+            return self._preempt_with(f"action '{self._action_name}': the goal was stopped{detail}")
         why = too_late or f"ended with status {_STATUS_NAMES.get(status, status)}{detail}"
         return self._abort(f"action '{self._action_name}' {why}")
 
@@ -212,7 +212,7 @@ def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
         ) from error
 
 
-def _ended(client: SimpleActionClient) -> bool:
+def _has_ended(client: SimpleActionClient) -> bool:
     """Returns whether the goal has ended and its result has arrived.
 
     The goal handle is used, because the client misses the end of a goal that ends while it is being sent.

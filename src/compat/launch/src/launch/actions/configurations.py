@@ -44,7 +44,7 @@ class DeclareLaunchArgument(Action):
             if not self._choices:
                 raise self._error("choices is empty; allowed: at least one value; leave choices out to allow all")
             if isinstance(default_value, str) and default_value not in self._choices:
-                raise self._error(f"default_value is '{default_value}'; {self._allowed(default_value)}")
+                raise self._error(f"default_value is '{default_value}'; {self._allowed_choices(default_value)}")
 
     @property
     def name(self) -> str:
@@ -83,9 +83,9 @@ class DeclareLaunchArgument(Action):
             configurations[self._name] = perform_substitutions(context, self._default)
         value = configurations[self._name]
         if self._choices is not None and value not in self._choices:
-            raise self._error(f"argument '{self._name}' is '{value}'; {self._allowed(str(value))}")
+            raise self._error(f"argument '{self._name}' is '{value}'; {self._allowed_choices(str(value))}")
 
-    def _allowed(self, value: str) -> str:
+    def _allowed_choices(self, value: str) -> str:
         choices = self._choices or []
         return f"allowed: {', '.join(choices)}{hint(value, choices)}; give an allowed value"
 

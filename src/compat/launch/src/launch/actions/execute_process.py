@@ -112,8 +112,8 @@ class ExecuteLocal(Action):
         return shlex.split(perform_text(context, prefix))
 
     def _environment(self, context: LaunchContext) -> dict[str, str]:
-        base = context.environment if self._env is None else _performed(context, self._env)
-        return {**base, **_performed(context, self._additional_env)}
+        base = context.environment if self._env is None else _perform_mapping(context, self._env)
+        return {**base, **_perform_mapping(context, self._additional_env)}
 
     def _performed_options(self, context: LaunchContext) -> dict[str, Any]:
         given = {**_OPTION_DEFAULTS, **self._options}
@@ -154,7 +154,7 @@ def _timeout(context: LaunchContext, given: Mapping[str, Any], name: str) -> flo
     return timeout_s
 
 
-def _performed(context: LaunchContext, texts: Mapping[Any, SomeSubstitutionsType]) -> dict[str, str]:
+def _perform_mapping(context: LaunchContext, texts: Mapping[Any, SomeSubstitutionsType]) -> dict[str, str]:
     return {perform_text(context, name): perform_text(context, value) for name, value in texts.items()}
 
 

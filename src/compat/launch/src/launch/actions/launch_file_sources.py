@@ -37,7 +37,7 @@ def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleTyp
     except LaunchError:
         raise
     except Exception as error:  # a launch file may raise anything
-        raise _failed(path, error) from error
+        raise _launch_file_error(path, error) from error
     finally:
         sys.dont_write_bytecode = write_bytecode
     return module
@@ -63,7 +63,7 @@ def get_launch_description_from_python_launch_file(python_launch_file_path: str)
     except LaunchError:
         raise
     except Exception as error:  # a launch file may raise anything
-        raise _failed(path, error) from error
+        raise _launch_file_error(path, error) from error
     if not isinstance(description, LaunchDescription):
         raise InvalidLaunchFileError(f"{path}: {FUNCTION}() returned {description!r}; allowed: a LaunchDescription")
     return description
@@ -78,7 +78,7 @@ def _existing(path_text: str) -> Path:
     raise InvalidLaunchFileError(f"{path}: there is no such file{hint(path.name, beside)}; {content}; correct the path")
 
 
-def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:
+def _launch_file_error(path: Path, error: Exception) -> InvalidLaunchFileError:
     """Returns the error of a launch file that raised an exception, with the line in the file."""
     where, traceback = str(path), error.__traceback__
     if isinstance(error, SyntaxError) and error.lineno is not None:

@@ -110,18 +110,18 @@ def _leaves(name: str, value: object, owner: str) -> Iterator[tuple[str, Paramet
         for key, inner in value.items():
             yield from _leaves(f"{name.rstrip('/')}/{key}", inner, owner)
     else:
-        yield name, _checked(name, value, owner)
+        yield name, _checked_value(name, value, owner)
 
 
-def _checked(name: str, value: object, owner: str) -> ParameterValue:
+def _checked_value(name: str, value: object, owner: str) -> ParameterValue:
     """Converts a value to the types of the parameter server."""
     match value:
         case bool() | int() | float() | str():
             return value
         case list() | tuple():
-            return [_checked(name, each, owner) for each in value]
+            return [_checked_value(name, each, owner) for each in value]
         case Mapping():
-            return {str(key): _checked(f"{name}/{key}", each, owner) for key, each in value.items()}
+            return {str(key): _checked_value(f"{name}/{key}", each, owner) for key, each in value.items()}
     description = "no value" if value is None else f"{value!r} of type {type(value).__name__}"
     raise LaunchError(f"{owner}: parameter {name}: got {description}; allowed: {ALLOWED}; correct or remove it")
 
