@@ -37,7 +37,7 @@ from modular_framework_testing.experiments.misspelt_names import (
     SET_PLANNER,
     TASK,
     Case,
-    changed,
+    changed_experiment,
     checks,
     experiment_faults,
     in_config,
@@ -87,7 +87,7 @@ def test_the_experiments_that_the_cases_change_are_in_order(content: dict, tmp_p
     ],
 )
 def test_names_that_something_answers_to_are_taken(path: tuple[str, ...], value: object, tmp_path: Path) -> None:
-    assert experiment_faults(changed(PLAIN, path, value), tmp_path) == ""
+    assert experiment_faults(changed_experiment(PLAIN, path, value), tmp_path) == ""
 
 
 def test_a_misspelt_parameter_of_a_pipeline_in_a_configuration_package_is_refused() -> None:
@@ -105,7 +105,7 @@ def test_a_misspelt_parameter_of_a_pipeline_in_a_configuration_package_is_refuse
 
 
 def test_a_parameter_of_a_node_of_ones_own_is_taken_when_it_is_listed(tmp_path: Path) -> None:
-    content = changed(TASK, ("parameters", "/my_node/gain"), 2.0)
+    content = changed_experiment(TASK, ("parameters", "/my_node/gain"), 2.0)
     assert "extra_parameters" in experiment_faults(content, tmp_path)
     assert experiment_faults({**content, "extra_parameters": ["/my_node/gain"]}, tmp_path) == ""
 
@@ -117,20 +117,22 @@ def test_a_task_that_places_in_a_region_needs_the_region(tmp_path: Path) -> None
     misspelt = experiment_faults({**placing, "regions": {"gaol": goal}}, tmp_path)
     assert "pick_and_place.yaml:" in misspelt and "allowed: gaol" in misspelt and "did you mean 'gaol'" in misspelt
     assert experiment_faults({**placing, "regions": {"goal": goal}}, tmp_path) == ""
-    on_launch = changed(placing, ("arguments", "regions"), "{goal: {x: [0.1, 0.2], y: [0.4, 0.5]}}")
+    on_launch = changed_experiment(placing, ("arguments", "regions"), "{goal: {x: [0.1, 0.2], y: [0.4, 0.5]}}")
     assert experiment_faults(on_launch, tmp_path) == ""
 
 
 def test_all_faults_of_an_experiment_are_listed_at_once(tmp_path: Path) -> None:
-    content = changed(TASK, ("parameters",), {"/planer_name": "$planner", "/robot_speed_factor": 7, "/max_torq": 1})
-    faults = experiment_faults(changed(content, ("arguments", "physics_engine"), "bullet"), tmp_path)
+    content = changed_experiment(
+        TASK, ("parameters",), {"/planer_name": "$planner", "/robot_speed_factor": 7, "/max_torq": 1}
+    )
+    faults = experiment_faults(changed_experiment(content, ("arguments", "physics_engine"), "bullet"), tmp_path)
     assert all(word in faults for word in ("planer_name", "robot_speed_factor", "max_torq", "bullet")), faults
 
 
 def _many_faults() -> dict:
-    content = changed(TASK, ("parameters",), {"/planer_name": "$planer", "/robot_speed_factor": 7})
-    content = changed(content, ("arguments", "physics_engine"), "bullet")
-    return changed(changed(content, ("objects", 0, "model"), "cub"), ("metrics",), ["sucess"])
+    content = changed_experiment(TASK, ("parameters",), {"/planer_name": "$planer", "/robot_speed_factor": 7})
+    content = changed_experiment(content, ("arguments", "physics_engine"), "bullet")
+    return changed_experiment(changed_experiment(content, ("objects", 0, "model"), "cub"), ("metrics",), ["sucess"])
 
 
 @pytest.mark.parametrize(
@@ -147,14 +149,14 @@ def _many_faults() -> dict:
 def test_a_fault_of_one_key_hides_no_fault_of_another(
     path: tuple[str, ...], value: object, words: tuple[str, ...], tmp_path: Path
 ) -> None:
-    faults = experiment_faults(changed(_many_faults(), path, value), tmp_path)
+    faults = experiment_faults(changed_experiment(_many_faults(), path, value), tmp_path)
     for word in (*words, "'$planer'", "'/robot_speed_factor' is 7", "is 'bullet'", "'cub'", "'sucess'"):
         assert word in faults, faults
 
 
 def test_a_misspelt_robot_makes_no_names_of_the_default_robot_wrong(tmp_path: Path) -> None:
-    content = changed(PLAIN, ("arguments", "moveit_config_package"), "panda_hand_moveit_confg")
-    content = changed(content, ("parameters",), {"/arm_group_name": "panda_arm", "/robot_speed_factor": 7})
+    content = changed_experiment(PLAIN, ("arguments", "moveit_config_package"), "panda_hand_moveit_confg")
+    content = changed_experiment(content, ("parameters",), {"/arm_group_name": "panda_arm", "/robot_speed_factor": 7})
     faults = experiment_faults(content, tmp_path)
     assert faults.startswith("2 faults") and "moveit_confg" in faults and "'/robot_speed_factor' is 7" in faults
 

@@ -12,7 +12,7 @@ import pytest
 
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.ros import robot_hw_node
-from modular_framework_control.ros.robot_hw_node import RobotHwNode, moves
+from modular_framework_control.ros.robot_hw_node import RobotHwNode, is_moving
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 RATE = 125.0
@@ -108,7 +108,7 @@ def make_node(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[RobotHwNod
 
 def test_a_moving_joint_is_braked_by_its_limits_until_it_is_at_rest(make_node: Callable[..., Any]) -> None:
     node, robot_hw = make_node(1.0)
-    assert moves(robot_hw, 0.5) and not moves_after(node, robot_hw)
+    assert is_moving(robot_hw, 0.5) and not moves_after(node, robot_hw)
     steps = [before - after for before, after in zip([1.0, *robot_hw.written], robot_hw.written, strict=False)]
     assert max(steps) <= ACCELERATION / RATE + 1e-9
     assert robot_hw.written[-1] == 0.0
@@ -118,7 +118,7 @@ def test_a_moving_joint_is_braked_by_its_limits_until_it_is_at_rest(make_node: C
 def moves_after(node: RobotHwNode, robot_hw: WatchedHardware) -> bool:
     assert node.run()
     assert robot_hw.left_by_controllers
-    return moves(robot_hw, 0.0)
+    return is_moving(robot_hw, 0.0)
 
 
 def test_a_robot_at_rest_is_written_to_once(make_node: Callable[..., Any]) -> None:

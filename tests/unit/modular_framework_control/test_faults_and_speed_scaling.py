@@ -297,7 +297,7 @@ def test_a_clock_slows_at_once_speeds_up_gradually_and_never_runs_ahead() -> Non
     assert (clock.now_s, clock.rate) == (100.1, 1.0)
     handles[1].factor = 0.2
     clock.advance(100.2)
-    assert clock.now_s == pytest.approx(100.12) and clock.at(100.7) == pytest.approx(100.62)
+    assert clock.now_s == pytest.approx(100.12) and clock.time_at(100.7) == pytest.approx(100.62)
     for nonsense, share in ((-1.0, 0.0), (math.nan, 0.0), (7.0, 0.2)):
         handles[0].factor = nonsense
         clock.start(0.0)

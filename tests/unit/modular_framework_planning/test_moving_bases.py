@@ -22,7 +22,7 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled
+from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled_states
 from modular_framework_testing.planning.independent_checker import box as solid_box
 
 pytest.importorskip("moveit_msgs.msg", reason="source the workspace: the messages are not built")
@@ -93,8 +93,8 @@ def test_a_base_drives_round_a_wall_without_touching_it_and_stays_in_the_workspa
     checker.set_world([("wall", solid_box(*WALL), shifted(*WALL_AT))], base_moves=True)
     rest = dict(zip(model.joint_names, scene.positions.tolist(), strict=True))
     straight = np.array([motion.positions[0], motion.positions[-1]])
-    assert checker.touching_pairs(names, sampled(straight, 0.01), rest)
-    assert not checker.touching_pairs(names, sampled(motion.positions, 0.01), rest)
+    assert checker.touching_pairs(names, sampled_states(straight, 0.01), rest)
+    assert not checker.touching_pairs(names, sampled_states(motion.positions, 0.01), rest)
     assert not checker.touching_pairs(names, motion.positions_at(motion.sample_times(0.002)), rest)
     indices = [model.index[name] for name in names]
     assert (np.abs(motion.velocities) <= model.max_velocity[indices] + 1e-6).all()
@@ -233,4 +233,6 @@ def test_a_joint_without_ends_goes_the_long_way_round_where_the_short_one_is_blo
     checker = IndependentChecker(URDF, SRDF.format(kind="fixed"), str)
     checker.set_world([("pole", solid_box(*pole), shifted(*pole_at)), ("lid", solid_box(*lid), shifted(*lid_at))])
     rest = dict(zip(model.joint_names, scene.positions.tolist(), strict=True))
-    assert not checker.touching_pairs(answer.trajectory.joint_names, sampled(answer.trajectory.positions, 0.01), rest)
+    assert not checker.touching_pairs(
+        answer.trajectory.joint_names, sampled_states(answer.trajectory.positions, 0.01), rest
+    )

@@ -31,7 +31,7 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
-from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled
+from modular_framework_testing.planning.independent_checker import IndependentChecker, sampled_states
 from modular_framework_testing.planning.independent_checker import box as solid_box
 
 ARM = ("pan", "lift", "elbow", "roll")
@@ -97,8 +97,8 @@ def test_two_arms_move_at_the_same_time_and_do_not_touch_each_other() -> None:
     checker.set_world([("pillar", solid_box(0.06, 0.06, 1.2), shifted(*at))])
     rest = named(scene.positions)
     straight = np.array([motion.positions[0], motion.positions[-1]])
-    assert checker.touching_pairs(motion.joint_names, sampled(straight, 0.01), rest)
-    assert not checker.touching_pairs(motion.joint_names, sampled(motion.positions, 0.01), rest)
+    assert checker.touching_pairs(motion.joint_names, sampled_states(straight, 0.01), rest)
+    assert not checker.touching_pairs(motion.joint_names, sampled_states(motion.positions, 0.01), rest)
     assert not checker.touching_pairs(motion.joint_names, motion.positions_at(motion.sample_times(0.005)), rest)
     for side in SIDES:
         columns = [motion.joint_names.index(f"{side}_{name}") for name in ARM]

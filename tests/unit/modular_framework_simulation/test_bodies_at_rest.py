@@ -188,7 +188,7 @@ def test_the_referee_takes_no_hit_for_a_jump(make_world: MakeWorld) -> None:
     world.set_state("ball", BodyState(Pose((-0.5, 0, 0.05)), Twist((6.0, 0, 0))))
     for _ in range(50):
         run(world, 0.02)
-        referee.look()
+        referee.look_for_jumps()
     assert world.entity_state("block").pose.position[0] > 0.3
     assert referee.interventions == ()
 

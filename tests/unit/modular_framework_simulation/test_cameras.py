@@ -276,7 +276,7 @@ def test_what_does_not_move_is_not_sent_again(empty: PhysicsWorld) -> None:
 
 def test_depth_outside_the_range_is_no_number() -> None:
     image = CameraImage(np.zeros((1, 4, 3), np.uint8), np.array([[0.3, 0.5, 2.0, np.nan]], np.float32))
-    kept = image.within((0.4, 1.0)).depth
+    kept = image.with_depth_range((0.4, 1.0)).depth
     assert np.isnan(kept).tolist() == [[True, False, True, True]]
 
 

@@ -30,7 +30,7 @@ def watched(world: PhysicsWorld, referee: Referee, duration_s: float) -> None:
     for _ in range(round(duration_s / (LOOK_STEPS * world.settings.time_step_s))):
         for _ in range(LOOK_STEPS):
             world.step()
-        referee.look()
+        referee.look_for_jumps()
 
 
 def test_what_falls_bounces_and_is_hit_is_no_intervention(world: PhysicsWorld) -> None:

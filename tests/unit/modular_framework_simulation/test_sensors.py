@@ -321,7 +321,7 @@ def test_a_sensor_of_an_inner_model_is_in_its_link() -> None:
 def test_noise_has_the_mean_the_deviation_and_the_bias_of_the_file() -> None:
     source = NoiseSource(7, "sensor", (Noise(0.5, 0.2, 3.0, 0.0), NO_NOISE))
     assert abs(source.biases[0]) == 3.0
-    noisy = np.array([source.added_to(np.array([1.0, 2.0]), time_ns) for time_ns in range(0, 20_000_000, 1_000)])
+    noisy = np.array([source.add_noise(np.array([1.0, 2.0]), time_ns) for time_ns in range(0, 20_000_000, 1_000)])
     shifted = noisy[:, 0] - source.biases[0]
     standard_error = 0.2 / math.sqrt(len(shifted))
     assert shifted.mean() == pytest.approx(1.5, abs=4 * standard_error)
@@ -333,7 +333,7 @@ def test_noise_has_the_mean_the_deviation_and_the_bias_of_the_file() -> None:
 
 
 def test_quantized_noise_gives_multiples_of_its_precision() -> None:
-    noisy = NoiseSource(1, "s", (Noise(stddev=1.0, precision=0.25),)).added_to(np.zeros((1, 100)), 5)
+    noisy = NoiseSource(1, "s", (Noise(stddev=1.0, precision=0.25),)).add_noise(np.zeros((1, 100)), 5)
     assert noisy / 0.25 == pytest.approx(np.rint(noisy / 0.25))
     assert len(set(noisy[0])) > 3
 
@@ -341,7 +341,7 @@ def test_quantized_noise_gives_multiples_of_its_precision() -> None:
 def test_the_same_seed_gives_the_same_bits_at_the_same_time_and_another_sensor_or_seed_gives_others() -> None:
     def drawn(seed: int, sensor: str, time_ns: int) -> bytes:
         source = NoiseSource(seed, sensor, (Noise(stddev=1.0),))
-        return source.added_to(np.zeros((1, 8)), time_ns).tobytes()
+        return source.add_noise(np.zeros((1, 8)), time_ns).tobytes()
 
     assert drawn(3, "a", 1_000) == drawn(3, "a", 1_000)
     assert len({drawn(3, "a", 1_000), drawn(3, "a", 2_000), drawn(3, "b", 1_000), drawn(4, "a", 1_000)}) == 4

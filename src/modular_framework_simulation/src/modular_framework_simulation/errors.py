@@ -17,14 +17,14 @@ class DescriptionError(SimulationError):
     """A world, model or robot description cannot be used.
 
     Args:
-        where: File, line and element at fault.
+        location: File, line and element at fault.
         problem: Invalid content.
         allowed: Accepted content, and the action to take.
     """
 
-    def __init__(self, where: str, problem: str, allowed: str) -> None:
-        super().__init__(f"{where}: {problem}; {allowed}")
-        self.where = where
+    def __init__(self, location: str, problem: str, allowed: str) -> None:
+        super().__init__(f"{location}: {problem}; {allowed}")
+        self.location = location
         self.problem = problem
         self.allowed = allowed
 

@@ -10,13 +10,13 @@ _MAX_NODES = 100_000
 _MATERIAL_LIBRARIES = ("library_images", "library_effects", "library_materials")
 
 
-def parse(content: bytes, where: str) -> Element:
+def parse(content: bytes, location: str) -> Element:
     """Returns the root element of a COLLADA file with tags without namespace.
 
     Raises:
         ValueError: The content is not XML, has a DOCTYPE, or is not COLLADA.
     """
-    root = xml_text.parse(content, where)
+    root = xml_text.parse(content, location)
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":

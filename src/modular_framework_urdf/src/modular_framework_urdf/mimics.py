@@ -26,18 +26,18 @@ class Mimic:
         return first, last
 
 
-def resolve_mimics(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str, Mimic]:
+def resolve_mimics(mimics: Mapping[str, Mimic], movable_names: Collection[str]) -> dict[str, Mimic]:
     """Returns the relation of each mimic joint to an independent leading joint.
 
     Args:
         mimics: Relations as written in the URDF, by mimic joint.
-        movable: Names of all movable joints.
+        movable_names: Names of all movable joints.
 
     Raises:
         ValueError: A leading joint is unknown or not movable, the relations form a cycle, a multiplier is 0, or a
             number is not finite.
     """
-    independent = sorted(set(movable) - mimics.keys())
+    independent = sorted(set(movable_names) - mimics.keys())
     result: dict[str, Mimic] = {}
     for name in mimics:
         path, total = [name], Mimic(name, 1.0, 0.0)
@@ -59,7 +59,7 @@ def resolve_mimics(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dic
                 f"offset {total.offset}; both must be finite, the multiplier not 0; make a joint that "
                 "never moves fixed"
             )
-        if total.leader not in movable:
+        if total.leader not in movable_names:
             raise ValueError(
                 f"URDF joint '{path[-2]}': it mimics '{total.leader}', which is not a movable joint; "
                 f"allowed: {', '.join(independent) or 'none'}; correct the name or remove <mimic>"

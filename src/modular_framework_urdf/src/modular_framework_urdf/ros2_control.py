@@ -59,36 +59,36 @@ class Ros2ControlHardware:
         return self.plugin in SIMULATION_PLUGINS
 
 
-def read_ros2_control(text: str, where: str = "robot_description") -> tuple[Ros2ControlHardware, ...]:
+def read_ros2_control(text: str, location: str = "robot_description") -> tuple[Ros2ControlHardware, ...]:
     """Returns the `<ros2_control>` tags of a URDF in file order.
 
     Args:
         text: URDF text.
-        where: Name of the file or parameter, for messages.
+        location: Name of the file or parameter, for messages.
 
     Raises:
         XmlError: The text is not XML, a tag has no plugin, or the initial value of a joint is not a number.
     """
-    return tuple(_hardware(tag, where) for tag in xml_text.parse(text, where).iter("ros2_control"))
+    return tuple(_hardware(tag, location) for tag in xml_text.parse(text, location).iter("ros2_control"))
 
 
-def _hardware(tag: xml_text.Element, where: str) -> Ros2ControlHardware:
+def _hardware(tag: xml_text.Element, location: str) -> Ros2ControlHardware:
     name = tag.get("name", "")
     plugin = (tag.findtext("hardware/plugin") or "").strip()
     if not plugin:
         raise xml_text.XmlError(
-            f"{where}:{tag.sourceline}",
+            f"{location}:{tag.sourceline}",
             f"<ros2_control name='{name}'> has no <hardware><plugin>",
             f"allowed: {MOCK_PLUGINS[0]}, {SIMULATION_PLUGINS[0]}, or package/Class of a RobotHW; add it",
         )
     parameters = {
         item.get("name", ""): _number_or_text((item.text or "").strip()) for item in tag.findall("hardware/param")
     }
-    joints = [_joint(item, where) for item in tag.findall("joint") if item.find("param[@name='mimic']") is None]
+    joints = [_joint(item, location) for item in tag.findall("joint") if item.find("param[@name='mimic']") is None]
     return Ros2ControlHardware(name, plugin, parameters, tuple(joints))
 
 
-def _joint(tag: xml_text.Element, where: str) -> Ros2ControlJoint:
+def _joint(tag: xml_text.Element, location: str) -> Ros2ControlJoint:
     name = tag.get("name", "")
     interfaces = tuple(sorted(item.get("name", "") for item in tag.findall("command_interface")))
     text = tag.findtext("state_interface[@name='position']/param[@name='initial_value']")
@@ -97,7 +97,7 @@ def _joint(tag: xml_text.Element, where: str) -> Ros2ControlJoint:
         return Ros2ControlJoint(name, interfaces, float(text), tag.sourceline)
     except ValueError:
         raise xml_text.XmlError(
-            f"{where}:{tag.sourceline}",
+            f"{location}:{tag.sourceline}",
             f"<ros2_control>: initial value of joint '{name}' is '{text}'",
             "expected a number [rad or m]; correct it",
         ) from None

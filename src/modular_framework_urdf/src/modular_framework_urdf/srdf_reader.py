@@ -111,25 +111,25 @@ class SemanticDescription:
     disabled_pairs: Mapping[frozenset[str], str] = field(default_factory=dict)
 
 
-def read_srdf(text: str | bytes, where: str = "SRDF") -> SemanticDescription:
+def read_srdf(text: str | bytes, location: str = "SRDF") -> SemanticDescription:
     """Reads an SRDF.
 
     Args:
         text: SRDF text.
-        where: Name of the file or parameter, for messages.
+        location: Name of the file or parameter, for messages.
 
     Raises:
         XmlError: The text is not XML or has a DOCTYPE, an attribute is missing, a position is not a number, or the
             number of values of a virtual joint in a group_state is wrong.
     """
-    return _Reader(where).read(xml_text.parse(text, where))
+    return _Reader(location).read(xml_text.parse(text, location))
 
 
 class _Reader:
-    """Reads one SRDF; `where` is its name in messages."""
+    """Reads one SRDF; `location` is its name in messages."""
 
-    def __init__(self, where: str) -> None:
-        self._where = where
+    def __init__(self, location: str) -> None:
+        self._where = location
 
     def read(self, root: Element) -> SemanticDescription:
         required_attribute = self._required_attribute

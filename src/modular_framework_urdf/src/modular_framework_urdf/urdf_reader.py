@@ -45,34 +45,34 @@ class AttributeFault(XmlError):
         expected: Allowed values.
     """
 
-    def __init__(self, where: str, *, tag: str, owner: str, key: str, text: str, expected: str) -> None:
+    def __init__(self, location: str, *, tag: str, owner: str, key: str, text: str, expected: str) -> None:
         super().__init__(
-            where, f"<{tag}> of {owner}: {key} is '{text}'", f"expected {expected}; correct the description"
+            location, f"<{tag}> of {owner}: {key} is '{text}'", f"expected {expected}; correct the description"
         )
         self.tag, self.owner, self.key, self.text, self.expected = tag, owner, key, text, expected
 
 
-def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
+def read_urdf(text: str | bytes, location: str = "robot_description") -> Robot:
     """Reads a URDF with expanded xacro.
 
     Args:
         text: URDF text.
-        where: Name of the file or parameter, for messages.
+        location: Name of the file or parameter, for messages.
 
     Raises:
         AttributeFault: A number is invalid.
         XmlError: The text is not well-formed XML, has a DOCTYPE, or contains xacro.
     """
-    root = xml_text.parse(text, where)
+    root = xml_text.parse(text, location)
     for element in root.iter():
         if element.tag.startswith(XACRO_TAGS):
             raise XmlError(
-                f"{where}:{element.sourceline}", "this is xacro", "allowed: URDF; expand the file with xacro"
+                f"{location}:{element.sourceline}", "this is xacro", "allowed: URDF; expand the file with xacro"
             )
     return Robot(
         root.get("name", ""),
-        tuple(_link(item, where) for item in root.findall("link")),
-        tuple(_joint(item, where) for item in root.findall("joint")),
+        tuple(_link(item, location) for item in root.findall("link")),
+        tuple(_joint(item, location) for item in root.findall("joint")),
         tuple(map(_transmission, root.findall("transmission"))),
     )
 
@@ -80,8 +80,8 @@ def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
 class _Attributes:
     """Reads the attributes of an optional element as numbers."""
 
-    def __init__(self, element: Element | None, owner: str, where: str) -> None:
-        self._element, self._owner, self._where = element, owner, where
+    def __init__(self, element: Element | None, owner: str, location: str) -> None:
+        self._element, self._owner, self._where = element, owner, location
 
     def text(self, key: str) -> str | None:
         return None if self._element is None else self._element.get(key)
@@ -128,15 +128,15 @@ class _Attributes:
         )
 
 
-def _link(element: Element, where: str) -> Link:
+def _link(element: Element, location: str) -> Link:
     name = element.get("name", "")
 
     def shapes(role: str) -> tuple[PlacedShapes, ...]:
         owner = f"{role} shape of link '{name}'"
         return tuple(
             PlacedShapes(
-                tuple(_shape(shape, owner, where) for shape in item.findall("geometry/*")),
-                _origin(item, owner, where),
+                tuple(_shape(shape, owner, location) for shape in item.findall("geometry/*")),
+                _origin(item, owner, location),
                 line=item.sourceline,
             )
             for item in element.findall(role)
@@ -145,13 +145,13 @@ def _link(element: Element, where: str) -> Link:
     return Link(name, shapes("visual"), shapes("collision"), line=element.sourceline)
 
 
-def _origin(element: Element, owner: str, where: str) -> Origin:
-    origin = _Attributes(element.find("origin"), owner, where)
+def _origin(element: Element, owner: str, location: str) -> Origin:
+    origin = _Attributes(element.find("origin"), owner, location)
     return Origin(origin.vector("xyz", (0.0, 0.0, 0.0)), origin.vector("rpy", (0.0, 0.0, 0.0)))
 
 
-def _shape(element: Element, owner: str, where: str) -> Shape:
-    attributes = _Attributes(element, owner, where)
+def _shape(element: Element, owner: str, location: str) -> Shape:
+    attributes = _Attributes(element, owner, location)
     match element.tag:
         case "box":
             return Box(attributes.required_vector("size"))
@@ -167,11 +167,11 @@ def _shape(element: Element, owner: str, where: str) -> Shape:
             return UnknownShape(tag)
 
 
-def _joint(element: Element, where: str) -> Joint:
+def _joint(element: Element, location: str) -> Joint:
     name = element.get("name", "")
 
     def attributes_of(tag: str) -> _Attributes:
-        return _Attributes(element.find(tag), f"joint '{name}'", where)
+        return _Attributes(element.find(tag), f"joint '{name}'", location)
 
     limit, safety, mimic = attributes_of("limit"), attributes_of("safety_controller"), attributes_of("mimic")
     return Joint(
@@ -179,7 +179,7 @@ def _joint(element: Element, where: str) -> Joint:
         kind=element.get("type", ""),
         parent=attributes_of("parent").text("link") or "",
         child=attributes_of("child").text("link") or "",
-        origin=_origin(element, f"joint '{name}'", where),
+        origin=_origin(element, f"joint '{name}'", location),
         axis=attributes_of("axis").vector("xyz", (1.0, 0.0, 0.0)),
         limit=None
         if element.find("limit") is None

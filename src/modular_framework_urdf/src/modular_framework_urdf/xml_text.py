@@ -25,34 +25,34 @@ class XmlError(ValueError):
     """A document is invalid.
 
     Args:
-        where: Name of the document and line.
+        location: Name of the document and line.
         found: Fault.
         allowed: Allowed content and remedy.
     """
 
-    def __init__(self, where: str, found: str, allowed: str) -> None:
-        super().__init__(f"{where}: {found}; {allowed}")
-        self.where, self.found, self.allowed = where, found, allowed
+    def __init__(self, location: str, found: str, allowed: str) -> None:
+        super().__init__(f"{location}: {found}; {allowed}")
+        self.location, self.found, self.allowed = location, found, allowed
 
 
-def refuse_doctype(text: str | bytes, where: str) -> None:
+def refuse_doctype(text: str | bytes, location: str) -> None:
     """Raises XmlError if a document has a DOCTYPE, without expanding any entity.
 
     Args:
         text: XML text, which need not be well-formed.
-        where: Name of the file or parameter, for messages.
+        location: Name of the file or parameter, for messages.
     """
-    _scan(text, where)
+    _scan(text, location)
 
 
-def _scan(text: str | bytes, where: str) -> tuple[list[int], Exception | None]:
+def _scan(text: str | bytes, location: str) -> tuple[list[int], Exception | None]:
     """Returns the line of each start tag and a syntax error, if any; raises XmlError for a DOCTYPE."""
     parser = expat.ParserCreate()
     lines: list[int] = []
 
     def refuse(*_: object) -> None:
         raise XmlError(
-            f"{where}:{parser.CurrentLineNumber}",
+            f"{location}:{parser.CurrentLineNumber}",
             "got a DOCTYPE",
             "allowed: XML without a DOCTYPE, because its entities could fill the memory; remove it",
         )
@@ -68,19 +68,19 @@ def _scan(text: str | bytes, where: str) -> tuple[list[int], Exception | None]:
     return lines, None
 
 
-def parse(text: str | bytes, where: str) -> Element:
+def parse(text: str | bytes, location: str) -> Element:
     """Returns the root element of a document without comments and processing instructions.
 
     Args:
         text: XML text.
-        where: Name of the file or parameter, for messages.
+        location: Name of the file or parameter, for messages.
 
     Raises:
         XmlError: The text is not well-formed XML or has a DOCTYPE.
     """
-    lines, error = _scan(text, where)
+    lines, error = _scan(text, location)
     if error is not None:
-        raise _syntax_error(where, getattr(error, "lineno", 1), error) from error
+        raise _syntax_error(location, getattr(error, "lineno", 1), error) from error
     is_text = isinstance(text, str)
     parser = etree.XMLParser(
         encoding="utf-8" if is_text else None,  # a declared encoding does not apply to decoded text
@@ -93,23 +93,23 @@ def parse(text: str | bytes, where: str) -> Element:
     try:
         root = etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
     except etree.XMLSyntaxError as fault:
-        raise _syntax_error(where, fault.lineno, fault.msg) from fault
+        raise _syntax_error(location, fault.lineno, fault.msg) from fault
     for entry in parser.error_log.filter_from_errors():
         if entry.domain != etree.ErrorDomains.NAMESPACE:  # libxml2's limits of depth and size
-            raise _syntax_error(where, entry.line, entry.message)
+            raise _syntax_error(location, entry.line, entry.message)
     try:
         _name_as_written(root)
     except ValueError as error:  # a name such as `a::b`
-        raise _syntax_error(where, 1, error) from error
+        raise _syntax_error(location, 1, error) from error
     for element, line in zip(root.iter(), lines, strict=True):
         if line <= _MAX_LINE:
             element.sourceline = line
     return root
 
 
-def _syntax_error(where: str, line: int | None, fault: object) -> XmlError:
+def _syntax_error(location: str, line: int | None, fault: object) -> XmlError:
     return XmlError(
-        f"{where}:{line or 1}",
+        f"{location}:{line or 1}",
         f"not an XML document (not well-formed XML: {fault})",
         "it must be well-formed XML; correct it",
     )

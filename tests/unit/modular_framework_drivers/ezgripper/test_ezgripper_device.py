@@ -304,7 +304,10 @@ def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: Dynamix
     until(lambda: bool(gripper.state().fault))
     line.power_on()
     until(lambda: not gripper.state().fault)
-    assert abs(mx64.signed(line.fingers[0].servo.get(mx64.PRESENT_POSITION)) - mx64.signed(before)) > 1000
+    assert (
+        abs(mx64.from_signed_word(line.fingers[0].servo.get(mx64.PRESENT_POSITION)) - mx64.from_signed_word(before))
+        > 1000
+    )
     assert gripper.state().reading.position == pytest.approx(1.9, abs=TOLERANCE)
 
 

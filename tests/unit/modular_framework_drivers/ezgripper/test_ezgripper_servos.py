@@ -89,7 +89,7 @@ def test_staying_leaves_a_motor_off_that_has_shut_down(bus: DirectBus, servos: G
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 1000)
     bus.servo.shut_down(ServoErrors.OVERLOAD)
     servos.hold_position()
-    assert mx64.signed(bus.servo.get(mx64.GOAL_POSITION)) == CLOSED + 1000
+    assert mx64.from_signed_word(bus.servo.get(mx64.GOAL_POSITION)) == CLOSED + 1000
     assert (bus.servo.get(mx64.TORQUE_CONTROL_MODE), bus.servo.get(mx64.TORQUE_LIMIT)) == (0, 0)
     assert bus.servo.errors == ServoErrors.OVERLOAD
 

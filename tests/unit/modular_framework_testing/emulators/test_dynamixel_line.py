@@ -88,7 +88,7 @@ def test_words_are_written_and_read_back(bus: DynamixelBus) -> None:
     for register, value in ((mx64.TORQUE_LIMIT, 700), (mx64.MULTI_TURN_OFFSET, -300)):
         assert bus.write(1, register, value) is ServoErrors.NONE
         data, _ = bus.read(1, register)
-        assert mx64.signed(mx64.from_bytes(data)) == value
+        assert mx64.from_signed_word(mx64.from_bytes(data)) == value
     reading = mx64.parse_reading(*bus.read(1, mx64.READING))
     assert (reading.position, reading.voltage, reading.temperature) == (250, 12.0, 30.0)
 

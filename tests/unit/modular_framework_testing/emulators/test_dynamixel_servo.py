@@ -103,7 +103,7 @@ def test_multi_turn_takes_negative_goals() -> None:
         servo.set(register, mx64.MULTI_TURN_LIMIT)
     goal = (-300 % 65536).to_bytes(2, "little")
     assert servo.handle(Instruction(1, 3, b"\x1e" + goal, True))[4] == 0
-    assert mx64.signed(servo.get(mx64.GOAL_POSITION)) == -300
+    assert mx64.from_signed_word(servo.get(mx64.GOAL_POSITION)) == -300
 
 
 def test_a_shutdown_takes_the_torque_until_it_is_given_again() -> None:

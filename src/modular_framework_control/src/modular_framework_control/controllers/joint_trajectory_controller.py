@@ -152,7 +152,7 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise ControllerError("the controller is not running and has no desired state; start it first")
-        trajectory_s, stored_from_s = self._clock.expected_at(time_s), self._plan.stored_from_s
+        trajectory_s, stored_from_s = self._clock.expected_time_at(time_s), self._plan.stored_from_s
         if stored_from_s is not None and trajectory_s < stored_from_s - MIN_SEGMENT_S:
             raise ControllerError(
                 f"got {time_s:.9g} s, which is before the start of the current motion, by "
@@ -300,7 +300,7 @@ class JointTrajectoryController(Controller):
             self._stop()
             return ""
         now_s = self._clock.now_s
-        origin_s = self._clock.at(goal.stamp_s) if goal.stamp_s != 0.0 else now_s
+        origin_s = self._clock.time_at(goal.stamp_s) if goal.stamp_s != 0.0 else now_s
         end_s = origin_s + float(goal.spline.times_s[-1])
         if end_s <= now_s + MIN_SEGMENT_S:
             return (

@@ -27,7 +27,7 @@ class HardwareInterfaceError(Exception):
     """A resource is unknown to the hardware, or was registered twice."""
 
 
-class _Named(Protocol):
+class _NamedHandle(Protocol):
     """Protocol of every handle."""
 
     @property
@@ -35,7 +35,7 @@ class _Named(Protocol):
         """Name of the handle."""
 
 
-HandleT = TypeVar("HandleT", bound=_Named)
+HandleT = TypeVar("HandleT", bound=_NamedHandle)
 
 
 class HardwareInterface(Generic[HandleT]):

@@ -79,7 +79,7 @@ class _Rate:
         self._changes.clear()
         self._last = math.nan
 
-    def of(self, value: float, period_s: float) -> float:
+    def derivative_at(self, value: float, period_s: float) -> float:
         """Returns the derivative at `value`, `period_s` after the last call."""
         if period_s > 0.0 and math.isfinite(self._last):
             self._changes.append((value - self._last) / period_s)
@@ -155,9 +155,9 @@ class FourWheelSteeringController(MobileBaseController):
             velocity.linear if abs(velocity.linear) > MIN_SPEED else velocity.lateral,
         )
         period_s, self._last_s = time_s - self._last_s, time_s
-        acceleration = self._rates[0].of(speed, period_s)
-        values = speed, acceleration, self._rates[1].of(acceleration, period_s)
-        turning = self._rates[2].of(axles[0], period_s), self._rates[3].of(axles[1], period_s)
+        acceleration = self._rates[0].derivative_at(speed, period_s)
+        values = speed, acceleration, self._rates[1].derivative_at(acceleration, period_s)
+        turning = self._rates[2].derivative_at(axles[0], period_s), self._rates[3].derivative_at(axles[1], period_s)
         due = super()._report(time_s)
         if due and self.on_steering is not None:
             self.on_steering(SteeringSnapshot(time_s, values, axles, turning))

@@ -40,12 +40,14 @@ def list_controllers(client: Client = None) -> None:
 
 def load_controller(name: str, client: Client = None) -> bool:
     """Loads a controller."""
-    return _succeeds(lambda: _client_or_default(client).load(name), f"Loaded '{name}'", f"Error when loading '{name}'")
+    return _has_succeeded(
+        lambda: _client_or_default(client).load(name), f"Loaded '{name}'", f"Error when loading '{name}'"
+    )
 
 
 def unload_controller(name: str, client: Client = None) -> bool:
     """Unloads a controller."""
-    return _succeeds(
+    return _has_succeeded(
         lambda: _client_or_default(client).unload(name),
         f"Unloaded '{name}' successfully",
         f"Error when unloading '{name}'",
@@ -84,7 +86,7 @@ def start_stop_controllers(
     """
     start, stop = list(start_controllers), list(stop_controllers)
     success_text = [f"{word} {names} successfully" for word, names in (("Started", start), ("Stopped", stop)) if names]
-    return _succeeds(
+    return _has_succeeded(
         lambda: _client_or_default(client).switch(start, stop),
         "\n".join(success_text),
         f"Error when starting {start} and stopping {stop}",
@@ -102,7 +104,7 @@ def reload_libraries(force_kill: bool, restore: bool = False, client: Client = N
     manager = _client_or_default(client)
     print("Restore:", restore)
     former_states = manager.list_controllers() if restore else []
-    if not _succeeds(
+    if not _has_succeeded(
         lambda: manager.reload_libraries(force_kill),
         "Successfully reloaded libraries",
         "Failed to reload libraries. Do you still have controllers loaded?",
@@ -116,14 +118,14 @@ def reload_libraries(force_kill: bool, restore: bool = False, client: Client = N
             manager.load(state.name)
         manager.switch([state.name for state in former_states if state.state == "running"], [])
 
-    return _succeeds(
+    return _has_succeeded(
         restore_controllers,
         "Controllers restored to original state",
         "Failed to restore the controllers to their original state",
     )
 
 
-def _succeeds(action: Callable[[], None], success_text: str, failure_text: str) -> bool:
+def _has_succeeded(action: Callable[[], None], success_text: str, failure_text: str) -> bool:
     try:
         action()
     except RefusedError as error:

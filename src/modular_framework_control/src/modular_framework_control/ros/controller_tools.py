@@ -137,13 +137,13 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
     try:
         for name in arguments.controllers if not ended.is_set() else ():
             rospy.loginfo("Loading controller: %s", name)
-            if _succeeds(lambda name=name: client.load(name), f"Failed to load {name}"):
+            if _has_succeeded(lambda name=name: client.load(name), f"Failed to load {name}"):
                 loaded.append(name)
             else:
                 failed.append(name)
         rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(loaded))
         if loaded and not arguments.stopped:
-            if _succeeds(lambda: client.switch(loaded, []), f"Failed to start controllers: {', '.join(loaded)}"):
+            if _has_succeeded(lambda: client.switch(loaded, []), f"Failed to start controllers: {', '.join(loaded)}"):
                 rospy.loginfo("Started controllers: %s", ", ".join(loaded))
             else:
                 failed += loaded
@@ -154,7 +154,7 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
         raise ControllerManagerClientError(f"not spawned: {', '.join(failed)}")
 
 
-def _succeeds(action: Callable[[], None], failure: str) -> bool:
+def _has_succeeded(action: Callable[[], None], failure: str) -> bool:
     try:
         action()
     except ControllerManagerClientError as error:

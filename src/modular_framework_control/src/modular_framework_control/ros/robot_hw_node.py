@@ -161,7 +161,7 @@ class RobotHwNode:
             rospy.logwarn("control loop without: %s", "; ".join(refused))
 
     def _loop(self, manager: RosControllerManager) -> None:
-        if not self._continues():
+        if not self._must_continue():
             return
         if rospy.rostime.is_wallclock():
             self._last_s = self._loop_time.now()
@@ -192,9 +192,9 @@ class RobotHwNode:
             manager.manager.watch_hardware()
         self._robot_hw.write(time_s, period_s)
         self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
-        return self._continues()
+        return self._must_continue()
 
-    def _continues(self) -> bool:
+    def _must_continue(self) -> bool:
         return not (self._ended.is_set() or self._failure or rospy.is_shutdown())
 
     def _wait_for_simulated_clock(self) -> None:
@@ -202,7 +202,7 @@ class RobotHwNode:
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
-            if not self._continues():
+            if not self._must_continue():
                 break
             with tick:
                 tick.wait(0.1)
@@ -231,7 +231,7 @@ class RobotHwNode:
         all_commands_known = all(handle.command == handle.command for _, handle in self._robot_hw.command_handles)
         succeeded = all_commands_known and self._final_step_succeeds("write")
         while succeeded and time.monotonic() - begun_s < MAX_END_TIME_S:
-            if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < MIN_WRITE_TIME_S else REST_VELOCITY):
+            if not is_moving(self._robot_hw, 0.0 if time.monotonic() - begun_s < MIN_WRITE_TIME_S else REST_VELOCITY):
                 break
             due_s += self._period_s
             time.sleep(max(0.0, due_s - time.monotonic()))
@@ -260,7 +260,7 @@ class RobotHwNode:
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
 
 
-def moves(robot_hw: RobotHW, max_rest_velocity: float) -> bool:
+def is_moving(robot_hw: RobotHW, max_rest_velocity: float) -> bool:
     """Returns whether a joint exceeds a velocity [rad/s or m/s] or has a nonzero velocity or effort command."""
     return any(
         abs(handle.velocity) > max_rest_velocity

@@ -151,14 +151,14 @@ class RosControllerManager:
             self._statistics_publisher = None
 
     def _on_load(self, request: Any) -> LoadControllerResponse:
-        return LoadControllerResponse(_succeeds(lambda: self.manager.load_controller(request.name)))
+        return LoadControllerResponse(_has_succeeded(lambda: self.manager.load_controller(request.name)))
 
     def _on_unload(self, request: Any) -> UnloadControllerResponse:
-        return UnloadControllerResponse(_succeeds(lambda: self.manager.unload_controller(request.name)))
+        return UnloadControllerResponse(_has_succeeded(lambda: self.manager.unload_controller(request.name)))
 
     def _on_switch(self, request: Any) -> SwitchControllerResponse:
         return SwitchControllerResponse(
-            _succeeds(
+            _has_succeeded(
                 lambda: self.manager.switch_controller(
                     request.start_controllers,
                     request.stop_controllers,
@@ -182,11 +182,11 @@ class RosControllerManager:
 
     def _on_reload(self, request: Any) -> ReloadControllerLibrariesResponse:
         return ReloadControllerLibrariesResponse(
-            _succeeds(lambda: self.manager.reload_controller_libraries(request.force_kill))
+            _has_succeeded(lambda: self.manager.reload_controller_libraries(request.force_kill))
         )
 
 
-def _succeeds(action: Callable[[], None]) -> bool:
+def _has_succeeded(action: Callable[[], None]) -> bool:
     """Calls an operation of the manager; logs the cause of a failure, as the responses only contain `ok`."""
     try:
         action()

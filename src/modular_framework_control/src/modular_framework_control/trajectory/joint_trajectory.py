@@ -306,7 +306,7 @@ def splice(
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
     ends_s = spline.times_s[first:]
-    if first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset):
+    if first > 0 and _is_consistent(spline, first - 1, splice_s - origin_s, state, offset):
         bridge = spline.coefficients[first - 1].copy()
         bridge[POSITION] += offset
     else:
@@ -336,7 +336,7 @@ def _whole_turns(position: Array, target: Array) -> Array:
     return full_turns * (2.0 * math.pi)
 
 
-def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:
+def _is_consistent(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:
     """Returns whether `state` at `time_s` is the start of the trajectory's own segment from `point`."""
     tolerance = 1e-6
     if abs(spline.times_s[point] - time_s) > 1e-9:

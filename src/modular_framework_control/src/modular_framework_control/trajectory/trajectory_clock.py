@@ -50,13 +50,15 @@ class TrajectoryClock:
         self.now_s += self.rate * elapsed_s
         self._lag_s = loop_s - self.now_s
 
-    def at(self, loop_s: float) -> float:
+    def time_at(self, loop_s: float) -> float:
         """Returns the clock's time at loop time `loop_s`, assuming full rate from now on."""
         return loop_s - self._lag_s
 
-    def expected_at(self, loop_s: float) -> float:
+    def expected_time_at(self, loop_s: float) -> float:
         """Returns the clock's time at loop time `loop_s`, assuming the current rate."""
-        return self.now_s + self.rate * (self.at(loop_s) - self.now_s) if self.rate != 1.0 else self.at(loop_s)
+        return (
+            self.now_s + self.rate * (self.time_at(loop_s) - self.now_s) if self.rate != 1.0 else self.time_at(loop_s)
+        )
 
     def scale_state(self, planned: Array) -> Array:
         """Scales velocities and accelerations of a planned state, shape (3, joints), by the rate, in place."""

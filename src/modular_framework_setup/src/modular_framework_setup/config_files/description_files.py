@@ -96,8 +96,8 @@ def _fault_location(path: Path, reason: str, error: Exception) -> tuple[Path, in
 
 def add_xml_error(error: XmlError, faults: FaultList) -> None:
     """Adds a fault for an error of the XML reader."""
-    match = _AT_LINE.match(error.where)
-    location = SourceLocation(match["file"], int(match["line"]), 1) if match else SourceLocation(error.where, 1, 1)
+    match = _AT_LINE.match(error.location)
+    location = SourceLocation(match["file"], int(match["line"]), 1) if match else SourceLocation(error.location, 1, 1)
     faults.add(location, f"{error.found}; {error.allowed}")
 
 

@@ -70,7 +70,7 @@ class CameraPublisher:
                 info.publish(camera_messages.camera_info(camera.pinhole, message_header))
         if not self.needs_image:
             return
-        image = renderer.image(camera.pinhole, update.cameras[camera.name]).within(camera.depth_range)
+        image = renderer.image(camera.pinhole, update.cameras[camera.name]).with_depth_range(camera.depth_range)
         image = image.with_noise(self._noise, update.time_ns)
         if _has_subscribers(self._image):
             self._image.publish(camera_messages.rgb_image(image, message_header))

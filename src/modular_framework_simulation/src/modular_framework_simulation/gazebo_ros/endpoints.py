@@ -19,7 +19,7 @@ from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 _RESPONSE_TIMEOUT_S = 30.0
 _TOPIC_QUEUE_SIZE = 10
 
-Work = Callable[[Any], Any]
+Handler = Callable[[Any], Any]
 """Function that handles a request or message and returns the response."""
 
 
@@ -34,32 +34,32 @@ class Endpoints:
         self._loop = loop
         self._opened: list[Any] = []
 
-    def in_loop(self, name: str, work: Callable[[], Any]) -> Any:
+    def in_loop(self, name: str, handler: Callable[[], Any]) -> Any:
         """Runs work in the loop's thread and returns the result."""
-        return self._loop.requests.call(name, work, _RESPONSE_TIMEOUT_S)
+        return self._loop.requests.call(name, handler, _RESPONSE_TIMEOUT_S)
 
-    def serve(self, name: str, kind: Any, work: Work) -> None:
+    def serve(self, name: str, kind: Any, handler: Handler) -> None:
         """Advertises a service with `success` and `status_message`, handled by the loop's thread.
 
         Args:
             name: Name of the service.
             kind: Type of the service.
-            work: Function that handles a request.
+            handler: Function that handles a request.
         """
-        self.serve_outside_loop(name, kind, lambda request: self.in_loop(name, lambda: work(request)))
+        self.serve_outside_loop(name, kind, lambda request: self.in_loop(name, lambda: handler(request)))
 
-    def serve_outside_loop(self, name: str, kind: Any, work: Work) -> None:
+    def serve_outside_loop(self, name: str, kind: Any, handler: Handler) -> None:
         """Advertises a service with `success` and `status_message`, handled by the request's thread.
 
         Args:
             name: Name of the service.
             kind: Type of the service.
-            work: Function that handles a request.
+            handler: Function that handles a request.
         """
 
         def handle(request: Any) -> Any:
             try:
-                response = work(request)
+                response = handler(request)
                 self._note(name, request)
                 return response
             except Exception as error:  # any request must get a response and must not end the node
@@ -67,18 +67,18 @@ class Endpoints:
 
         self._opened.append(rospy.Service(name, kind, handle))
 
-    def command(self, name: str, kind: Any, work: Callable[[Any], None]) -> None:
+    def command(self, name: str, kind: Any, handler: Callable[[Any], None]) -> None:
         """Advertises a service with an empty response; if the work fails, the call fails with the reason.
 
         Args:
             name: Name of the service.
             kind: Type of the service.
-            work: Function that handles a request in the loop's thread.
+            handler: Function that handles a request in the loop's thread.
         """
 
         def handle(request: Any) -> Any:
             try:
-                self.in_loop(name, lambda: work(request))
+                self.in_loop(name, lambda: handler(request))
                 self._note(name, request)
             except Exception as error:  # any request must get a response and must not end the node
                 raise rospy.ServiceException(f"{name}: {_reason(name, error)}") from None
@@ -86,19 +86,19 @@ class Endpoints:
 
         self._opened.append(rospy.Service(name, kind, handle))
 
-    def subscribe(self, topic: str, kind: Any, work: Callable[[Any], None]) -> None:
+    def subscribe(self, topic: str, kind: Any, handler: Callable[[Any], None]) -> None:
         """Subscribes to a topic; a failure is logged.
 
         Args:
             topic: Name of the topic.
             kind: Type of the messages.
-            work: Function that handles a message in the loop's thread.
+            handler: Function that handles a message in the loop's thread.
         """
 
         def handle(message: Any) -> None:
             def attempt() -> None:
                 try:
-                    work(message)
+                    handler(message)
                     self._note(topic, message)
                 except Exception as error:  # a message must not end the loop
                     _reason(f"{topic} (topic)", error)

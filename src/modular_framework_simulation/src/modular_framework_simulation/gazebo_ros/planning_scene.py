@@ -141,7 +141,7 @@ class PlanningScenePublisher:
         if not self._server_available():
             return _PRESENCE_PERIOD_S
         self._compare()
-        changes = self._changes.towards(snapshot, exact)
+        changes = self._changes.changes_towards(snapshot, exact)
         if not changes:
             self._last_problem = self._last_problem if not exact else ""
             return _SYNC_PERIOD_S

@@ -132,7 +132,7 @@ class SceneChanges:
         self._attached = {key: link for key, link in attached.items() if key in self._sent}
         return sorted(removed)
 
-    def towards(self, snapshot: WorldSnapshot, exact: bool = False) -> list[Change]:
+    def changes_towards(self, snapshot: WorldSnapshot, exact: bool = False) -> list[Change]:
         """Returns the changes to send; after the scene has accepted them, call `confirm`.
 
         Args:
@@ -153,7 +153,7 @@ class SceneChanges:
         return changes
 
     def confirm(self) -> None:
-        """Records that the scene has accepted the changes of the last `towards`."""
+        """Records that the scene has accepted the changes of the last `changes_towards`."""
         changed = {key for key, state in self._pending.items() if self._sent.get(key) is not state}
         unchanged = self._pending.keys() - changed
         attached = {

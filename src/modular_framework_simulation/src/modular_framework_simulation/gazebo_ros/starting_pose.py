@@ -24,16 +24,16 @@ def parse_starting_pose(text: str) -> dict[str, float]:
     positions: dict[str, float] = {}
     for start in range(0, len(words), 3):
         triple = words[start : start + 3]
-        where = f"starting pose, word {start + 1}"
+        location = f"starting pose, word {start + 1}"
         if len(triple) != 3 or triple[0] != "-J":
-            raise DescriptionError(where, f"got '{' '.join(triple)}'", "expected '-J <joint> <value>', repeated")
+            raise DescriptionError(location, f"got '{' '.join(triple)}'", "expected '-J <joint> <value>', repeated")
         try:
             value = float(triple[2])
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise DescriptionError(where, f"got the value '{triple[2]}'", "expected a finite number [rad or m]")
+            raise DescriptionError(location, f"got the value '{triple[2]}'", "expected a finite number [rad or m]")
         if triple[1] in positions:
-            raise DescriptionError(where, f"names joint '{triple[1]}' again", "give each joint once")
+            raise DescriptionError(location, f"names joint '{triple[1]}' again", "give each joint once")
         positions[triple[1]] = value
     return positions

@@ -79,13 +79,13 @@ class TimeServices:
         while self._services:
             self._services.pop().shutdown("the simulation ends")
 
-    def _in_loop(self, name: str, work: Callable[[], Any]) -> Any:
-        return self._loop.requests.call(name, work, _RESPONSE_TIMEOUT_S)
+    def _in_loop(self, name: str, function: Callable[[], Any]) -> Any:
+        return self._loop.requests.call(name, function, _RESPONSE_TIMEOUT_S)
 
     def _on_hold(self, request: Any) -> HoldTimeResponse:
         holds = self._loop.holds
 
-        def work() -> Any:
+        def hold_time() -> Any:
             if request.lease_s == 0.0:
                 holds.release(request.owner)
             else:
@@ -95,7 +95,7 @@ class TimeServices:
         try:
             if not self._may_hold:
                 raise HoldError("simulated time cannot be held, because /wait_for_planning is false")
-            return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, work))
+            return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, hold_time))
         except (HoldError, SimulationError) as error:
             rospy.logerr("%s: %s", ros_names.HOLD_TIME, error)
             return HoldTimeResponse(success=False, message=str(error))
@@ -208,5 +208,5 @@ class TimeServices:
     def _on_digest(self, _request: Any) -> TriggerResponse:
         digest = self._digest
         assert digest is not None
-        found = self._in_loop(ros_names.STATE_DIGEST, lambda: (*digest.checkpoints, digest.now()))
+        found = self._in_loop(ros_names.STATE_DIGEST, lambda: (*digest.checkpoints, digest.current_checkpoint()))
         return TriggerResponse(success=True, message=json.dumps([[item.step, item.digest] for item in found]))

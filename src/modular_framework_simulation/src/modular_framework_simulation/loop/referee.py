@@ -74,7 +74,7 @@ class Referee:
             self._count += 1
             self._interventions.append(Intervention(self._count, self._world.time_ns * 1e-9, what, caller))
 
-    def look(self) -> None:
+    def look_for_jumps(self) -> None:
         """Records models that moved farther since the last check than their velocity allows; used as a hook.
 
         Requests that move models are recorded by their services; after such a request, the check restarts.

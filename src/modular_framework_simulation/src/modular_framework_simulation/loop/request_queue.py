@@ -15,8 +15,8 @@ T = TypeVar("T")
 
 
 class _Request:
-    def __init__(self, work: Callable[[], Any]) -> None:
-        self.work = work
+    def __init__(self, function: Callable[[], Any]) -> None:
+        self.function = function
         self.done = threading.Event()
         self.result: Any = None
         self.error: Exception | None = None
@@ -30,7 +30,7 @@ class _Request:
                 return
             self.started = True
         try:
-            self.result = self.work()
+            self.result = self.function()
         except Exception as error:  # raised in the thread of the caller
             self.error = error
         self.done.set()
@@ -43,19 +43,19 @@ class RequestQueue:
         self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
         self._arrived = threading.Event()
 
-    def call(self, name: str, work: Callable[[], T], timeout_s: float) -> T:
+    def call(self, name: str, function: Callable[[], T], timeout_s: float) -> T:
         """Runs work in the loop's thread and waits for the result.
 
         Args:
             name: Name of the work for the error message, for example "spawn_sdf_model".
-            work: Function that is called in the loop's thread.
+            function: Function that is called in the loop's thread.
             timeout_s: Timeout of the start of the work [s of real time].
 
         Raises:
             LoopTimeoutError: The loop did not start the work in time, and will not start it later.
             Exception: Any exception of the work.
         """
-        request = _Request(work)
+        request = _Request(function)
         self._requests.put(request)
         self._arrived.set()
         if not request.done.wait(timeout_s):
@@ -71,9 +71,9 @@ class RequestQueue:
             raise LoopTimeoutError(f"the simulation loop did not complete '{name}' within {2 * timeout_s:g} s")
         return request.result  # type: ignore[no-any-return]
 
-    def post(self, work: Callable[[], Any]) -> None:
+    def post(self, function: Callable[[], Any]) -> None:
         """Runs work in the loop's thread without waiting; the work must not raise an exception."""
-        self._requests.put(_Request(work))
+        self._requests.put(_Request(function))
         self._arrived.set()
 
     def run_pending(self) -> None:

@@ -286,7 +286,7 @@ class SimulationLoop:
 
     def watch_grasps(self) -> None:
         """Updates the grasp watches with the contacts of the fingers, and calls the referee; used as a hook."""
-        self.referee.look()
+        self.referee.look_for_jumps()
         if self._actors is None:
             return
         robot = self._actors.robot

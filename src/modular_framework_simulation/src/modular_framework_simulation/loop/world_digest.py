@@ -51,8 +51,8 @@ class WorldDigest:
                 values += (*pose.position, *pose.quaternion)
         self._hash.update(struct.pack(f"<q{len(values)}d", step, *values))
         if step % CHECKPOINT_STEPS == 0:
-            self.checkpoints.append(self.now())
+            self.checkpoints.append(self.current_checkpoint())
 
-    def now(self) -> Checkpoint:
+    def current_checkpoint(self) -> Checkpoint:
         """Returns the hash of all steps so far."""
         return Checkpoint(self._last_step, self._hash.hexdigest())

@@ -12,13 +12,13 @@ _COEFFICIENTS = ("ode/mu", "ode/mu2", "bullet/friction", "bullet/friction2")
 
 
 def changed_model(
-    text: str, where: str, *, mass: float = 1.0, friction: float = 1.0, centre_of_mass: float = 0.0
+    text: str, location: str, *, mass: float = 1.0, friction: float = 1.0, centre_of_mass: float = 0.0
 ) -> str:
     """Returns the description of a model with another mass, friction or centre of mass.
 
     Args:
         text: SDF file of a model.
-        where: Name of the file, for errors.
+        location: Name of the file, for errors.
         mass: Positive factor of masses and moments of inertia.
         friction: Positive factor of the sliding friction coefficients; surfaces that never slide keep theirs.
         centre_of_mass: Distance by which the centre of mass of each link moves along the x axis of the link [m].
@@ -29,9 +29,11 @@ def changed_model(
     """
     if mass == friction == 1.0 and centre_of_mass == 0.0:
         return text
-    root = parsed_model(text, where)
+    root = parsed_model(text, location)
     if root.find(".//include") is not None:
-        raise DescriptionError(where, "got an <include>", "allowed in a perturbed model: links and shapes of its own")
+        raise DescriptionError(
+            location, "got an <include>", "allowed in a perturbed model: links and shapes of its own"
+        )
     if mass != 1.0:
         for link in root.iter("link"):
             _change_mass(link, mass)
@@ -40,7 +42,7 @@ def changed_model(
             _change_friction(collision, friction)
     if centre_of_mass != 0.0:
         for link in root.iter("link"):
-            _move_centre_of_mass(link, centre_of_mass, where)
+            _move_centre_of_mass(link, centre_of_mass, location)
     return to_text(root)
 
 
@@ -62,11 +64,11 @@ def _is_computed(inertial: Element) -> bool:
     return inertial.get("auto", "false").strip().lower() in ("true", "1")
 
 
-def _move_centre_of_mass(link: Element, offset_m: float, where: str) -> None:
+def _move_centre_of_mass(link: Element, offset_m: float, location: str) -> None:
     inertial = _child(link, "inertial")
     if _is_computed(inertial):
         allowed = "allowed with another centre of mass: an <inertial> with mass and inertia"
-        raise DescriptionError(where, "got <inertial auto='true'>", allowed)
+        raise DescriptionError(location, "got <inertial auto='true'>", allowed)
     pose = _child(inertial, "pose")
     x, *others = (pose.text or "0 0 0 0 0 0").split()
     pose.text = " ".join([repr(float(x) + offset_m), *others])

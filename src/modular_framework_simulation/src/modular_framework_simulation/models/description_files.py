@@ -40,7 +40,7 @@ def files_in_description(text: str, resources: Resources) -> tuple[Path, ...]:
     """
     files: dict[Path, None] = {}
     try:
-        _add_named(parse_xml(text, ""), resources, files)
+        _add_referenced_files(parse_xml(text, ""), resources, files)
     except DescriptionError:
         return ()
     return tuple(files)
@@ -56,10 +56,10 @@ def _add_description(path: Path, resources: Resources, files: dict[Path, None]) 
             converted_version(root)
     except DescriptionError:
         return
-    _add_named(root, resources, files)
+    _add_referenced_files(root, resources, files)
 
 
-def _add_named(node: XmlNode, resources: Resources, files: dict[Path, None]) -> None:
+def _add_referenced_files(node: XmlNode, resources: Resources, files: dict[Path, None]) -> None:
     for child in node.children:
         try:
             if child.tag == "include":
@@ -73,7 +73,7 @@ def _add_named(node: XmlNode, resources: Resources, files: dict[Path, None]) -> 
                 _add_all(_mesh_files(resources.resolve(child, child.attributes["filename"])), files)
         except DescriptionError:
             continue
-        _add_named(child, resources, files)
+        _add_referenced_files(child, resources, files)
 
 
 def _add_all(paths: Iterable[Path], files: dict[Path, None]) -> None:

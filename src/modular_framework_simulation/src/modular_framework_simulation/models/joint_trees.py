@@ -75,7 +75,7 @@ def _tree_joints(model: Model, root: str, joints_of: dict[str, list[Joint]]) -> 
             outward = joint if joint.parent == link else _reversed_joint(model, joint)
             if outward.child in reached:
                 raise DescriptionError(
-                    joint.where or f"{model.source}: joint '{joint.name}'",
+                    joint.location or f"{model.source}: joint '{joint.name}'",
                     f"closes a loop of joints of model '{model.name}' through '{outward.child}'",
                     "allowed: joints that form trees, or a static model",
                 )

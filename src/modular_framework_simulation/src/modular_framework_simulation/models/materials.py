@@ -123,7 +123,7 @@ def script_material(script: XmlNode, resources: Resources) -> Material:
     known = gazebo_material(name) if name.startswith(GAZEBO_PREFIX) else None
     if known is None:
         looked = ", ".join(str(folder) for folder in folders) or "no existing file"
-        raise DescriptionError(script.where, f"material '{name}' is not found", f"looked in {looked}")
+        raise DescriptionError(script.location, f"material '{name}' is not found", f"looked in {looked}")
     return known
 
 

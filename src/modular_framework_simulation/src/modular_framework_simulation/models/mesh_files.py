@@ -47,7 +47,7 @@ def default_cache_folder() -> Path:
     return Path(home) / "modular_framework" / "convex_parts"
 
 
-def _silent(_text: str) -> None:
+def _ignore_log(_text: str) -> None:
     """Discards a message."""
 
 
@@ -59,7 +59,7 @@ class ConvexParts:
         log: Function that logs a message before a step that may take minutes.
     """
 
-    def __init__(self, cache_folder: Path, log: Callable[[str], None] = _silent) -> None:
+    def __init__(self, cache_folder: Path, log: Callable[[str], None] = _ignore_log) -> None:
         self._cache_folder = cache_folder
         self._log = log
 

@@ -77,10 +77,10 @@ def read_robot(
     try:
         root, robot = xml_text.parse(text, "robot_description"), read_urdf(text)
     except AttributeFault as error:
-        where = f"{error.where}: {error.owner}, <{error.tag} {error.key}=...>"
-        raise DescriptionError(where, f"got '{error.text}'", f"expected {error.expected}") from error
+        location = f"{error.location}: {error.owner}, <{error.tag} {error.key}=...>"
+        raise DescriptionError(location, f"got '{error.text}'", f"expected {error.expected}") from error
     except xml_text.XmlError as error:
-        raise DescriptionError(error.where, error.found, error.allowed) from error
+        raise DescriptionError(error.location, error.found, error.allowed) from error
     links = tuple(link.name for link in robot.links)
     if root.tag != "robot" or not links:
         raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")
@@ -118,8 +118,8 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
             {joint.name: joint.mimic for joint in joints if joint.mimic is not None}, [joint.name for joint in joints]
         )
     except ValueError as error:
-        where, _, problem = str(error).partition(": ")
-        raise DescriptionError(f"robot_description: {where}", *problem.split("; ", 1)) from error
+        location, _, problem = str(error).partition(": ")
+        raise DescriptionError(f"robot_description: {location}", *problem.split("; ", 1)) from error
     by_name = {joint.name: joint for joint in joints}
     return tuple(
         _follower(joint, mimics[joint.name], by_name[mimics[joint.name].leader]) if joint.name in mimics else joint
@@ -149,11 +149,11 @@ def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
     for transmission in robot.transmissions:
         for joint in transmission.joints:
             if not joint.interfaces:
-                where = (
+                location = (
                     f"robot_description:{joint.line}: <transmission name='{transmission.name}'>, joint '{joint.name}'"
                 )
                 raise DescriptionError(
-                    where, "has no <hardwareInterface>", "add a position, velocity or effort interface"
+                    location, "has no <hardwareInterface>", "add a position, velocity or effort interface"
                 )
             interfaces[joint.name] = interfaces.get(joint.name, ()) + tuple(each.text for each in joint.interfaces)
     return interfaces
@@ -164,13 +164,13 @@ def _simulated_joints(text: str, robot: Robot) -> list[Ros2ControlJoint]:
     try:
         tags = read_ros2_control(text)
     except xml_text.XmlError as error:
-        raise DescriptionError(error.where, error.found, error.allowed) from error
+        raise DescriptionError(error.location, error.found, error.allowed) from error
     movable = [joint.name for joint in robot.movable_joints()]
     joints = [joint for tag in tags if tag.is_simulated for joint in tag.joints]
     for joint in joints:
         if joint.name not in movable:
-            where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
-            raise DescriptionError(where, "is not a movable joint", f"allowed: {', '.join(movable)}")
+            location = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
+            raise DescriptionError(location, "is not a movable joint", f"allowed: {', '.join(movable)}")
     return joints
 
 
@@ -178,9 +178,9 @@ def _commands(joint: Ros2ControlJoint) -> tuple[str, ...]:
     """Converts the command interfaces of a joint to hardware interfaces of ros_control."""
     unknown = [name for name in joint.command_interfaces if name not in COMMAND_INTERFACES]
     if unknown:
-        where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
+        location = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
         allowed = f"allowed in simulation: {', '.join(COMMAND_INTERFACES)}"
-        raise DescriptionError(where, f"has the command interface '{unknown[0]}'", allowed)
+        raise DescriptionError(location, f"has the command interface '{unknown[0]}'", allowed)
     return tuple(COMMAND_INTERFACES[name] for name in joint.command_interfaces)
 
 
@@ -188,8 +188,8 @@ def _require_parent_and_child(robot: Robot) -> None:
     for joint in robot.joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if not link:
-                where = f"robot_description:{joint.line}: joint '{joint.name}'"
-                raise DescriptionError(where, f"has no <{role} link=...>", "a joint connects two links")
+                location = f"robot_description:{joint.line}: joint '{joint.name}'"
+                raise DescriptionError(location, f"has no <{role} link=...>", "a joint connects two links")
 
 
 def _joint(joint: Joint, interfaces: tuple[str, ...]) -> RobotJoint:
@@ -220,9 +220,9 @@ def _frictions(root: Element) -> dict[str, float]:
         except ValueError:
             value = math.nan
         if math.isnan(value):
-            where = f"robot_description: <gazebo reference='{link}'>, <mu1>"
+            location = f"robot_description: <gazebo reference='{link}'>, <mu1>"
             allowed = "allowed: a number; -1 for surfaces that never slide"
-            raise DescriptionError(where, f"got '{coefficient.text}'", allowed)
+            raise DescriptionError(location, f"got '{coefficient.text}'", allowed)
         frictions[link] = UNLIMITED_FRICTION if value < 0 else value
     return frictions
 
@@ -255,8 +255,8 @@ def _require_sizes(link: str, shape: Element) -> None:
             except ValueError:
                 max_length = math.inf
             if not max_length <= MAX_LENGTH_M:
-                where = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
-                raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {MAX_LENGTH_M:g} m")
+                location = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
+                raise DescriptionError(location, f"got '{text}'", f"allowed: lengths of at most {MAX_LENGTH_M:g} m")
 
 
 def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:

@@ -115,8 +115,8 @@ def _geometry(link: str, shape: urdf.Shape, find_package: PackageFinder) -> spec
             try:
                 return specs.Mesh(mesh_path(uri, find_package), scale)
             except MeshError as error:
-                where = f"robot_description: mesh of link '{link}'"
-                raise DescriptionError(where, error.found, error.allowed) from error
+                location = f"robot_description: mesh of link '{link}'"
+                raise DescriptionError(location, error.found, error.allowed) from error
     return None  # the engine refuses all other shapes
 
 

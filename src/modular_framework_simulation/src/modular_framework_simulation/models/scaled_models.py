@@ -29,7 +29,7 @@ def read_scaled(file: Path, factor: float | None) -> str:
     return text if factor is None else scaled_model(text, factor, str(file))
 
 
-def scaled_model(text: str, factor: float, where: str) -> str:
+def scaled_model(text: str, factor: float, location: str) -> str:
     """Returns the description of a model whose lengths are multiplied by a factor.
 
     Masses grow with the third power of the factor, and moments of inertia with the fifth.
@@ -37,14 +37,14 @@ def scaled_model(text: str, factor: float, where: str) -> str:
     Args:
         text: SDF file of a model.
         factor: Positive factor.
-        where: Name of the file, for errors.
+        location: Name of the file, for errors.
 
     Raises:
         DescriptionError: The text is not XML, or the model has parts that cannot be scaled.
     """
-    root = parsed_model(text, where)
+    root = parsed_model(text, location)
     if found := next((name for name in UNSCALABLE if root.find(f".//{name}") is not None), ""):
-        raise DescriptionError(where, f"got a <{found}>", "allowed in a model with a size: links and shapes alone")
+        raise DescriptionError(location, f"got a <{found}>", "allowed in a model with a size: links and shapes alone")
     for mesh in root.iter("mesh"):
         if mesh.find("scale") is None:
             add_child(mesh, "scale").text = "1 1 1"
@@ -61,20 +61,20 @@ def scaled_model(text: str, factor: float, where: str) -> str:
     return to_text(root)
 
 
-def parsed_model(text: str, where: str) -> Element:
+def parsed_model(text: str, location: str) -> Element:
     """Returns the root element of a model's description.
 
     Args:
         text: SDF file of a model.
-        where: Name of the file, for errors.
+        location: Name of the file, for errors.
 
     Raises:
         DescriptionError: The text is not XML.
     """
     try:
-        return parse(text, where)
+        return parse(text, location)
     except XmlError as error:
-        raise DescriptionError(error.where, error.found, error.allowed) from error
+        raise DescriptionError(error.location, error.found, error.allowed) from error
 
 
 def multiply_numbers(element: Element, factor: float, first: int | None = None) -> None:

@@ -36,10 +36,10 @@ def pose_of(node: XmlNode) -> Pose:
         try:
             return Pose((x, y, z), normalised_quaternion((qx, qy, qz, qw)))
         except ValueError as error:
-            raise DescriptionError(node.where, f"got '{node.text.strip()}'", str(error)) from error
+            raise DescriptionError(node.location, f"got '{node.text.strip()}'", str(error)) from error
     if rotation != "euler_rpy":
         problem = f"got rotation_format '{rotation}'"
-        raise DescriptionError(node.where, problem, "allowed: euler_rpy, quat_xyzw")
+        raise DescriptionError(node.location, problem, "allowed: euler_rpy, quat_xyzw")
     x, y, z, roll, pitch, yaw = node.numbers(6)
     if node.attributes.get("degrees", "false").strip().lower() in ("true", "1"):
         roll, pitch, yaw = math.radians(roll), math.radians(pitch), math.radians(yaw)
@@ -148,7 +148,7 @@ class FrameTree:
         if link is None and name.startswith(prefix):  # old files add the model's name as a prefix
             link = self._link(name.removeprefix(prefix), ())
         if link is None:
-            raise DescriptionError(node.where, f"'{name}' is not a link", f"allowed: {', '.join(self._links())}")
+            raise DescriptionError(node.location, f"'{name}' is not a link", f"allowed: {', '.join(self._links())}")
         return link
 
     def _links(self) -> list[str]:
@@ -159,7 +159,7 @@ class FrameTree:
     def _link(self, name: str, visited: tuple[str, ...]) -> str | None:
         """Returns the link that a frame is attached to; None for an unknown name."""
         if name in visited:
-            raise DescriptionError(self._holder.where, f"'{name}' is attached to itself", "break the circle")
+            raise DescriptionError(self._holder.location, f"'{name}' is attached to itself", "break the circle")
         if name in ("", MODEL_FRAME):
             return self._canonical_link or None
         if name in self._nodes:
@@ -190,12 +190,12 @@ class FrameTree:
         node = self._nodes.get(name) or self._joints.get(name)
         if node is None:
             known = ", ".join([MODEL_FRAME, *self._nodes, *self._joints, *self._inner])
-            raise DescriptionError(self._holder.where, f"a pose is relative to '{name}'", f"allowed: {known}")
+            raise DescriptionError(self._holder.location, f"a pose is relative to '{name}'", f"allowed: {known}")
         return self._pose_of_node(node, (*visited, name))
 
     def _where(self, name: str) -> str:
         node = self._nodes.get(name) or self._joints.get(name) or self._holder
-        return node.where
+        return node.location
 
     def _pose_of_node(self, node: XmlNode, visited: tuple[str, ...]) -> Pose:
         pose = node.find("pose")

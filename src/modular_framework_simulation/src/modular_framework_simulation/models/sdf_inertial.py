@@ -51,7 +51,7 @@ def read_inertial(
     mass_node, inertia_node = node.find("mass"), node.find("inertia")
     mass = mass_node.number() if mass_node is not None else _DEFAULT_MASS_KG
     if mass <= 0:
-        raise DescriptionError((mass_node or node).where, f"got mass {mass:g} kg", "allowed: greater than 0")
+        raise DescriptionError((mass_node or node).location, f"got mass {mass:g} kg", "allowed: greater than 0")
 
     def moment(tag: str) -> float:
         child = inertia_node.find(tag) if inertia_node is not None else None
@@ -99,7 +99,7 @@ def _computed_from_shapes(node: XmlNode, link: XmlNode, collisions: tuple[specs.
     densities = {child.name(): non_negative(child, "density") or default for child in link.find_all("collision")}
     solid = inertial_of_shapes([(shape, _density_of(shape.name, densities, default)) for shape in collisions])
     if solid is None:
-        raise DescriptionError(node.where, "has auto='true'", "a <collision> with a volume is required")
+        raise DescriptionError(node.location, "has auto='true'", "a <collision> with a volume is required")
     return solid
 
 

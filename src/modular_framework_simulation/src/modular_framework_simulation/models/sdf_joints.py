@@ -40,7 +40,7 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
     if child == specs.WORLD:
         if kind is not specs.JointType.FIXED:
             allowed = "allowed: the world as the parent of a movable joint; exchange <parent> and <child>"
-            raise DescriptionError(child_node.where, "is the world", allowed)
+            raise DescriptionError(child_node.location, "is the world", allowed)
         return _without_axis(node, kind, specs.WORLD, parent, Pose())
     joint_in_model = frames.joint_pose_in_model(node)
     pose = frames.pose_in_model(child).inverse() @ joint_in_model
@@ -52,9 +52,9 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
     if kind is specs.JointType.CONTINUOUS:
         lower, upper = -math.inf, math.inf
     if lower > upper:
-        where = (axis_node.find("limit") or axis_node).where
+        location = (axis_node.find("limit") or axis_node).location
         raise DescriptionError(
-            where, f"got lower {lower:g} and upper {upper:g}", "allowed: a lower limit below the upper limit"
+            location, f"got lower {lower:g} and upper {upper:g}", "allowed: a lower limit below the upper limit"
         )
     return specs.Joint(
         node.name(),
@@ -68,14 +68,22 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
         effort=drive_bound(axis_node, "effort"),
         velocity=drive_bound(axis_node, "velocity"),
         dynamics=read_joint_dynamics(axis_node),
-        where=node.where,
+        location=node.location,
     )
 
 
 def _without_axis(node: XmlNode, kind: specs.JointType, parent: str, child: str, pose: Pose) -> specs.Joint:
     along_z = (0.0, 0.0, 1.0)
     return specs.Joint(
-        node.name(), kind, parent, child, pose=pose, axis=along_z, lower=-math.inf, upper=math.inf, where=node.where
+        node.name(),
+        kind,
+        parent,
+        child,
+        pose=pose,
+        axis=along_z,
+        lower=-math.inf,
+        upper=math.inf,
+        location=node.location,
     )
 
 
@@ -85,7 +93,7 @@ def _axis_in_joint(node: XmlNode, joint_in_model: Pose, frames: FrameTree, versi
     x, y, z = xyz.numbers(3) if xyz is not None else (0.0, 0.0, 1.0)
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
-        raise DescriptionError((xyz or node).where, "got an axis of length 0", "expected a direction")
+        raise DescriptionError((xyz or node).location, "got an axis of length 0", "expected a direction")
     axis = (x / length, y / length, z / length)
     axis_frame = _frame_of_axis(node, frames, version)
     if axis_frame is None:

@@ -47,12 +47,12 @@ def sdf_version(root: XmlNode) -> tuple[int, ...]:
     supported = f"{_text(OLDEST_VERSION)} to {_text(NEWEST_VERSION)}"
     if root.tag not in ("sdf", "gazebo"):
         raise DescriptionError(
-            root.where, f"the root element is <{root.tag}>", f"allowed: <sdf version='...'>, {supported}"
+            root.location, f"the root element is <{root.tag}>", f"allowed: <sdf version='...'>, {supported}"
         )
     text = root.attributes.get("version", "")
     version = version_numbers(text)
     if not OLDEST_VERSION <= version <= NEWEST_VERSION:
-        raise DescriptionError(root.where, f"got version '{text}'", f"allowed: {supported}")
+        raise DescriptionError(root.location, f"got version '{text}'", f"allowed: {supported}")
     return version
 
 
@@ -109,7 +109,7 @@ class SdfModels:
             return self.include_model(include, depth, static)
         if root.find("light") is not None or root.find("actor") is not None:
             return None
-        raise DescriptionError(root.where, "contains no <model>", "a <model> or <include> is required")
+        raise DescriptionError(root.location, "contains no <model>", "a <model> or <include> is required")
 
     def include_model(self, node: XmlNode, depth: int, static: bool | None = None) -> LoadedModel | None:
         """Reads the model of an <include>, and applies the name, pose and static of the <include>.
@@ -128,7 +128,7 @@ class SdfModels:
         self._require_shallow(node, depth)
         if node.attributes.get("merge", "false").strip().lower() in ("true", "1"):
             raise DescriptionError(
-                node.where, "has merge='true'", "allowed: an <include> without merge; copy the model's content"
+                node.location, "has merge='true'", "allowed: an <include> without merge; copy the model's content"
             )
         uri = node.require("uri").text.strip()
         own_static = node.find("static")
@@ -178,7 +178,7 @@ class SdfModels:
             reading.notes.add_lines(each.spec.notes)
             sensors += [_scoped_sensor(sensor, name) for sensor in each.spec.sensors]
         if not links:
-            raise DescriptionError(node.where, "has no <link>", "a model needs at least one")
+            raise DescriptionError(node.location, "has no <link>", "a model needs at least one")
         _refuse_duplicates(own_links + node.find_all("joint"))
         self_collide = node.find("self_collide")
         spec = specs.Model(
@@ -208,7 +208,7 @@ class SdfModels:
                 continue
             if loaded.spec.name in inner:
                 raise DescriptionError(
-                    child.where, f"is a second model '{loaded.spec.name}'", "give each model its own name"
+                    child.location, f"is a second model '{loaded.spec.name}'", "give each model its own name"
                 )
             inner[loaded.spec.name] = loaded
         return inner
@@ -221,11 +221,13 @@ class SdfModels:
     def _require_shallow(self, node: XmlNode, depth: int) -> None:
         if depth >= _MAX_DEPTH:
             raise DescriptionError(
-                node.where, f"has the nesting depth {depth + 1}", f"allowed: {_MAX_DEPTH}; break the circle of includes"
+                node.location,
+                f"has the nesting depth {depth + 1}",
+                f"allowed: {_MAX_DEPTH}; break the circle of includes",
             )
         self._models += node.tag == "model"
         if self._models > _MAX_MODELS:
-            raise DescriptionError(node.where, f"is model number {self._models:,}", f"allowed: {_MAX_MODELS:,}")
+            raise DescriptionError(node.location, f"is model number {self._models:,}", f"allowed: {_MAX_MODELS:,}")
 
 
 def _read_link(node: XmlNode, frames: FrameTree, static: bool, reading: Reading) -> specs.Link:
@@ -288,5 +290,5 @@ def _refuse_duplicates(nodes: list[XmlNode]) -> None:
     for node in nodes:
         key = (node.tag, node.name())
         if key in seen:
-            raise DescriptionError(node.where, f"has the name of another {node.tag}", "give each its own name")
+            raise DescriptionError(node.location, f"has the name of another {node.tag}", "give each its own name")
         seen.add(key)

@@ -51,7 +51,7 @@ class Notes:
             text: Text of the note.
             kind: Kind of the note; later notes of the same kind are dropped. By default, only equal lines are dropped.
         """
-        line = f"{node.where}: {text}"
+        line = f"{node.location}: {text}"
         self._lines.setdefault(kind or line, line)
 
     def add_lines(self, lines: tuple[str, ...]) -> None:

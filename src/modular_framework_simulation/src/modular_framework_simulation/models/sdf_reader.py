@@ -87,11 +87,11 @@ def _models_of(
         elif child.tag == "model":
             model = reader.model(child, version, 0)
         elif child.tag in _REFUSED_IN_WORLD:
-            raise DescriptionError(child.where, "is not supported", _REFUSED_IN_WORLD[child.tag])
+            raise DescriptionError(child.location, "is not supported", _REFUSED_IN_WORLD[child.tag])
         if model is not None:
             if model.spec.name in loaded and version >= _UNIQUE_NAMES_FROM:
                 raise DescriptionError(
-                    child.where, f"is a second model '{model.spec.name}'", "give each model its own name"
+                    child.location, f"is a second model '{model.spec.name}'", "give each model its own name"
                 )
             model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
@@ -100,13 +100,13 @@ def _models_of(
     return loaded, ignored
 
 
-def _with_free_name(model: LoadedModel, used_names: Collection[str], where: str) -> LoadedModel:
+def _with_free_name(model: LoadedModel, used_names: Collection[str], location: str) -> LoadedModel:
     """Returns the model; if its name is in use, with a numbered name and a note."""
     name = model.spec.name
     if name not in used_names:
         return model
     free_name = next(numbered for number in itertools.count() if (numbered := f"{name}_{number}") not in used_names)
-    notes = (*model.spec.notes, f"{where}: is a second model '{name}'; the model is renamed to '{free_name}'")
+    notes = (*model.spec.notes, f"{location}: is a second model '{name}'; the model is renamed to '{free_name}'")
     return dataclasses.replace(model, spec=dataclasses.replace(model.spec, name=free_name, notes=notes))
 
 
@@ -124,7 +124,7 @@ def read_model_text(text: str, source: str, resources: Resources) -> specs.Model
     root = parse_xml(text, source)
     loaded = SdfModels(resources).in_document(root)
     if loaded is None:
-        raise DescriptionError(root.where, "contains only a light or an actor, which have no body", "add a <model>")
+        raise DescriptionError(root.location, "contains only a light or an actor, which have no body", "add a <model>")
     refuse_loops(loaded.spec)
     placed = FrameTree(root.find("world") or root, {loaded.spec.name: loaded.placed})
     return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name))
@@ -164,7 +164,7 @@ def with_saved_state(models: list[specs.Model], state: XmlNode | None) -> list[s
     for tag in ("insertions", "deletions"):
         change = state.find(tag)
         if change is not None and change.children:
-            raise DescriptionError(change.where, "adds or removes models", "allowed: a saved world without changes")
+            raise DescriptionError(change.location, "adds or removes models", "allowed: a saved world without changes")
     saved = {node.attributes.get("name", ""): node for node in state.find_all("model")}
     return [_restored_model(model, saved[model.name]) if model.name in saved else model for model in models]
 
@@ -184,7 +184,7 @@ def _restored_model(model: specs.Model, saved: XmlNode) -> specs.Model:
         if distance > _TOLERANCE_M or angle > _TOLERANCE_RAD:
             moved[link.name] = in_model
     if moved and model.joints:
-        notes.append(f"{saved.where}: the saved joint positions have no effect; the joints start at 0")
+        notes.append(f"{saved.location}: the saved joint positions have no effect; the joints start at 0")
         moved = {}
     scale = _saved_scale(saved)
     links = tuple(
@@ -197,7 +197,7 @@ def _saved_scale(saved: XmlNode) -> Vector3:
     node = saved.find("scale")
     x, y, z = node.numbers(3) if node is not None else (1.0, 1.0, 1.0)
     if node is not None and min(x, y, z) <= 0.0:
-        raise DescriptionError(node.where, f"got '{node.text.strip()}'", "allowed: numbers greater than 0")
+        raise DescriptionError(node.location, f"got '{node.text.strip()}'", "allowed: numbers greater than 0")
     return x, y, z
 
 

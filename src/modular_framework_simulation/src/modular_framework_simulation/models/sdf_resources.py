@@ -66,7 +66,9 @@ class Resources:
             candidates = self._fuel_candidates(rest)
         else:
             raise DescriptionError(
-                node.where, f"got URI '{uri}'", "allowed: model://, package://, file:// or a path relative to the file"
+                node.location,
+                f"got URI '{uri}'",
+                "allowed: model://, package://, file:// or a path relative to the file",
             )
         for candidate in candidates:
             if (rest if separator else uri) and candidate.exists():
@@ -76,7 +78,7 @@ class Resources:
             looked_in += f" and in {len(candidates) - _MAX_LISTED_FOLDERS} more folders"
         looked_in = looked_in or "no folder, because no model folder is set"
         advice = f"set gazebo_model_path or {MODEL_PATH}"
-        raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {advice}")
+        raise DescriptionError(node.location, f"'{uri}' does not exist", f"looked for {looked_in}; {advice}")
 
     def _fuel_candidates(self, address: str) -> list[Path]:
         """Returns the local candidates of a Gazebo Fuel model, which is not downloaded."""
@@ -94,7 +96,9 @@ class Resources:
         try:
             return Path(self.find_package(package)) / relative
         except Exception as error:  # the caller's function may raise anything for a missing package
-            raise DescriptionError(node.where, f"package '{package}' is not found ({error})", "install it") from error
+            raise DescriptionError(
+                node.location, f"package '{package}' is not found ({error})", "install it"
+            ) from error
 
     def model_file(self, node: XmlNode, uri: str) -> Path:
         """Returns the SDF file of an included model; a URI of a folder refers to the file in its model.config.
@@ -106,7 +110,7 @@ class Resources:
         if path.is_file():
             return path
         if not (path / "model.config").is_file() and not (path / "model.sdf").is_file():
-            raise DescriptionError(node.where, f"'{path}' contains no model", "a model folder needs a model.config")
+            raise DescriptionError(node.location, f"'{path}' contains no model", "a model folder needs a model.config")
         return model_file(path)
 
 
@@ -132,12 +136,12 @@ def _newest_file(config: Path, root: XmlNode) -> Path:
     """Returns the file with the newest supported SDF version in a model.config."""
     entries = root.find_all("sdf")
     if not entries:
-        raise DescriptionError(root.where, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")
+        raise DescriptionError(root.location, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")
     readable = [entry for entry in entries if _version_of(entry) <= NEWEST_VERSION]
     newest = max(readable or entries, key=_version_of)
     file = config.parent / newest.text.strip()
     if not file.is_file():
-        raise DescriptionError(newest.where, f"'{file}' does not exist", "name a file of the model's folder")
+        raise DescriptionError(newest.location, f"'{file}' does not exist", "name a file of the model's folder")
     return file
 
 

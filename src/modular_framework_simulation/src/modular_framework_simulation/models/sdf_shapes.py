@@ -134,7 +134,7 @@ def _read_geometry(node: XmlNode, resources: Resources) -> list[tuple[Pose, spec
         return []
     if len(node.children) != 1 or node.children[0].tag not in _GEOMETRIES:
         got = ", ".join(f"<{child.tag}>" for child in node.children) or "nothing"
-        raise DescriptionError(node.where, f"contains {got}", f"allowed: exactly one of {', '.join(_GEOMETRIES)}")
+        raise DescriptionError(node.location, f"contains {got}", f"allowed: exactly one of {', '.join(_GEOMETRIES)}")
     shape = node.children[0]
     match shape.tag:
         case "box":
@@ -151,7 +151,7 @@ def _read_geometry(node: XmlNode, resources: Resources) -> list[tuple[Pose, spec
             return [(Pose(), _read_plane(shape))]
         case "mesh":
             return [(Pose(), _read_mesh(shape, resources))]
-    raise DescriptionError(shape.where, "is not a known shape", f"allowed: {', '.join(_GEOMETRIES)}")
+    raise DescriptionError(shape.location, "is not a known shape", f"allowed: {', '.join(_GEOMETRIES)}")
 
 
 def _capsule(radius: float, length: float) -> list[tuple[Pose, specs.Geometry]]:
@@ -165,7 +165,7 @@ def _read_plane(node: XmlNode) -> specs.Plane:
     x, y, z = normal_node.numbers(3) if normal_node is not None else (0.0, 0.0, 1.0)
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
-        raise DescriptionError((normal_node or node).where, "got a normal of length 0", "expected a direction")
+        raise DescriptionError((normal_node or node).location, "got a normal of length 0", "expected a direction")
     width, depth = _positive(size_node, 2) if size_node is not None else (1.0, 1.0)
     return specs.Plane((x / length, y / length, z / length), (width, depth))
 
@@ -175,13 +175,13 @@ def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
     try:
         path = resources.resolve(uri, uri.text.strip())
     except DescriptionError as error:
-        raise MissingMeshError(error.where, error.problem, error.allowed) from error
+        raise MissingMeshError(error.location, error.problem, error.allowed) from error
     if path.suffix.lower() not in _MESH_SUFFIXES:
-        raise DescriptionError(uri.where, f"got '{path.name}'", f"allowed: {', '.join(_MESH_SUFFIXES)}")
+        raise DescriptionError(uri.location, f"got '{path.name}'", f"allowed: {', '.join(_MESH_SUFFIXES)}")
     scale = node.find("scale")
     x, y, z = scale.numbers(3) if scale is not None else (1.0, 1.0, 1.0)
     if scale is not None and not all((x, y, z)):
-        raise DescriptionError(scale.where, f"got '{scale.text.strip()}'", "allowed: numbers different from 0")
+        raise DescriptionError(scale.location, f"got '{scale.text.strip()}'", "allowed: numbers different from 0")
     submesh = node.find("submesh")
     if submesh is None:
         return specs.Mesh(path, (x, y, z))
@@ -193,12 +193,12 @@ def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
 def _positive(node: XmlNode, count: int) -> tuple[float, ...]:
     values = node.numbers(count)
     if min(values) <= 0:
-        raise DescriptionError(node.where, f"got '{node.text.strip()}'", "allowed: greater than 0")
+        raise DescriptionError(node.location, f"got '{node.text.strip()}'", "allowed: greater than 0")
     return values
 
 
 def _sizes(node: XmlNode, count: int) -> tuple[float, ...]:
     values = _positive(node, count)
     if max(values) > MAX_LENGTH_M:
-        raise DescriptionError(node.where, f"got '{node.text.strip()}'", f"allowed: at most {MAX_LENGTH_M:g} m")
+        raise DescriptionError(node.location, f"got '{node.text.strip()}'", f"allowed: at most {MAX_LENGTH_M:g} m")
     return values

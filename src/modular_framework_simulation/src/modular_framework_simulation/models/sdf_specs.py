@@ -239,7 +239,7 @@ class Joint:
         effort: Maximum effort of a drive [N m or N].
         velocity: Maximum velocity [rad/s or m/s].
         dynamics: Passive forces.
-        where: File, line and element of the description.
+        location: File, line and element of the description.
     """
 
     name: str
@@ -254,7 +254,7 @@ class Joint:
     effort: float = math.inf
     velocity: float = math.inf
     dynamics: JointDynamics = JointDynamics()
-    where: str = ""
+    location: str = ""
 
 
 @dataclass(frozen=True, slots=True)

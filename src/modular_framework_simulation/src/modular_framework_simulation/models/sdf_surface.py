@@ -21,7 +21,7 @@ def non_negative(node: XmlNode | None, *path: str) -> float | None:
         return None
     value = child.number()
     if value < 0:
-        raise DescriptionError(child.where, f"got {value:g}", "allowed: 0 or greater")
+        raise DescriptionError(child.location, f"got {value:g}", "allowed: 0 or greater")
     return value
 
 
@@ -67,8 +67,8 @@ def read_bounce(collision: XmlNode) -> specs.Bounce:
     restitution = non_negative(bounce, "restitution_coefficient")
     threshold = non_negative(bounce, "threshold")
     if restitution is not None and restitution > 1 and bounce is not None:
-        where = bounce.require("restitution_coefficient").where
-        raise DescriptionError(where, f"got {restitution:g}", "allowed: 0 to 1")
+        location = bounce.require("restitution_coefficient").location
+        raise DescriptionError(location, f"got {restitution:g}", "allowed: 0 to 1")
     return specs.Bounce(
         default.restitution_coefficient if restitution is None else restitution,
         default.threshold if threshold is None else threshold,
@@ -105,7 +105,7 @@ def _bitmask(node: XmlNode) -> int:
     except ValueError:
         value = -1
     if not 0 <= value <= 0xFFFFFFFF:
-        raise DescriptionError(node.where, f"got '{text}'", "allowed: a whole number from 0 to 0xFFFFFFFF")
+        raise DescriptionError(node.location, f"got '{text}'", "allowed: a whole number from 0 to 0xFFFFFFFF")
     return value
 
 

@@ -57,13 +57,13 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     """
     root = parse_xml(text, source)
     if root.tag != "robot":
-        raise DescriptionError(root.where, f"the root element is <{root.tag}>", "allowed: <robot>")
+        raise DescriptionError(root.location, f"the root element is <{root.tag}>", "allowed: <robot>")
     _refuse_xacro(root)
     joint_nodes = root.find_all("joint")
     parents = {_role(joint, "child"): joint for joint in joint_nodes}
     nodes = [link for link in root.find_all("link") if link.name() != "world"]
     if not nodes:
-        raise DescriptionError(root.where, "has no <link>", "an object needs a link that is not named 'world'")
+        raise DescriptionError(root.location, "has no <link>", "an object needs a link that is not named 'world'")
     notes = Notes()
     extensions = UrdfExtensions(root, notes)
     for child in root.children:
@@ -109,7 +109,7 @@ def collision_name(name: str, link: str, index: int) -> str:
 
 def _refuse_xacro(node: XmlNode) -> None:
     if node.tag.startswith(XACRO_TAGS):
-        raise DescriptionError(node.where, "is xacro", "allowed: URDF; expand the file with xacro first")
+        raise DescriptionError(node.location, "is xacro", "allowed: URDF; expand the file with xacro first")
     for child in node.children:
         _refuse_xacro(child)
 
@@ -123,7 +123,7 @@ def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:
             leader = mimics[leader].attributes.get("joint", "")
         if leader in visited:
             circle = " -> ".join([*visited, leader])
-            raise DescriptionError(mimic.where, f"joint '{name}' mimics itself ({circle})", "break the circle")
+            raise DescriptionError(mimic.location, f"joint '{name}' mimics itself ({circle})", "break the circle")
 
 
 def _refuse_two_parents(joints: list[XmlNode]) -> None:
@@ -131,7 +131,7 @@ def _refuse_two_parents(joints: list[XmlNode]) -> None:
     for joint in joints:
         child = _role(joint, "child")
         if child in seen:
-            raise DescriptionError(joint.where, f"gives link '{child}' a second parent", "allowed: trees")
+            raise DescriptionError(joint.location, f"gives link '{child}' a second parent", "allowed: trees")
         seen.add(child)
 
 
@@ -151,7 +151,7 @@ def _named_colours(root: XmlNode) -> dict[str, specs.Colour]:
 
 
 def _colour(node: XmlNode) -> specs.Colour:
-    red, green, blue, alpha = parse_numbers(node.where, node.attributes.get("rgba", ""), 4)
+    red, green, blue, alpha = parse_numbers(node.location, node.attributes.get("rgba", ""), 4)
     return (red, green, blue, alpha)
 
 
@@ -164,7 +164,7 @@ def _pose_in_root(link: str, parents: dict[str, XmlNode], depth: int = 0) -> Pos
     if joint is None:
         return Pose()
     if depth > len(parents):
-        raise DescriptionError(joint.where, "belongs to a loop of joints", "allowed: trees")
+        raise DescriptionError(joint.location, "belongs to a loop of joints", "allowed: trees")
     return _pose_in_root(_role(joint, "parent"), parents, depth + 1) @ _origin(joint)
 
 
@@ -172,8 +172,8 @@ def _origin(node: XmlNode) -> Pose:
     origin = node.find("origin")
     if origin is None:
         return Pose()
-    x, y, z = parse_numbers(origin.where, origin.attributes.get("xyz", "0 0 0"), 3)
-    roll, pitch, yaw = parse_numbers(origin.where, origin.attributes.get("rpy", "0 0 0"), 3)
+    x, y, z = parse_numbers(origin.location, origin.attributes.get("xyz", "0 0 0"), 3)
+    roll, pitch, yaw = parse_numbers(origin.location, origin.attributes.get("rpy", "0 0 0"), 3)
     return Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
 
 
@@ -241,11 +241,13 @@ def _visual(
 
 def _inertial(node: XmlNode, collisions: tuple[specs.Collision, ...], notes: Notes) -> specs.Inertial:
     mass_node, inertia = node.require("mass"), node.require("inertia")
-    mass = parse_numbers(mass_node.where, mass_node.attributes.get("value", ""), 1)[0]
+    mass = parse_numbers(mass_node.location, mass_node.attributes.get("value", ""), 1)[0]
     if mass <= 0:
-        raise DescriptionError(mass_node.where, f"got mass {mass:g} kg", "allowed: greater than 0")
+        raise DescriptionError(mass_node.location, f"got mass {mass:g} kg", "allowed: greater than 0")
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    xx, xy, xz, yy, yz, zz = (parse_numbers(inertia.where, inertia.attributes.get(each, "0"), 1)[0] for each in names)
+    xx, xy, xz, yy, yz, zz = (
+        parse_numbers(inertia.location, inertia.attributes.get(each, "0"), 1)[0] for each in names
+    )
     return with_valid_inertia(specs.Inertial(_origin(node), mass, (xx, xy, xz, yy, yz, zz)), collisions, inertia, notes)
 
 
@@ -253,14 +255,14 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
     shape = node.children[0] if node.children else node
 
     def lengths(attribute: str, count: int, default: str = "") -> tuple[float, ...]:
-        values = parse_numbers(shape.where, shape.attributes.get(attribute, default), count)
+        values = parse_numbers(shape.location, shape.attributes.get(attribute, default), count)
         if attribute == "scale" and all(values):
             return values
         if min(values) <= 0:
-            raise DescriptionError(shape.where, f"got {attribute}='{values}'", "allowed: greater than 0")
+            raise DescriptionError(shape.location, f"got {attribute}='{values}'", "allowed: greater than 0")
         if max(values) > MAX_LENGTH_M:
             problem = f"got {attribute}='{shape.attributes.get(attribute)}'"
-            raise DescriptionError(shape.where, problem, f"allowed: at most {MAX_LENGTH_M:g} m")
+            raise DescriptionError(shape.location, problem, f"allowed: at most {MAX_LENGTH_M:g} m")
         return values
 
     match shape.tag:
@@ -274,21 +276,21 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
         case "mesh":
             x, y, z = lengths("scale", 3, "1 1 1")
             return specs.Mesh(_mesh_file(shape, resources), (x, y, z))
-    raise DescriptionError(node.where, f"contains <{shape.tag}>", f"allowed: one of {', '.join(_GEOMETRIES)}")
+    raise DescriptionError(node.location, f"contains <{shape.tag}>", f"allowed: one of {', '.join(_GEOMETRIES)}")
 
 
 def _mesh_file(shape: XmlNode, resources: Resources) -> Path:
     try:
         return resources.resolve(shape, shape.attributes.get("filename", ""))
     except DescriptionError as error:
-        raise MissingMeshError(error.where, error.problem, error.allowed) from error
+        raise MissingMeshError(error.location, error.problem, error.allowed) from error
 
 
 def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, notes: Notes) -> specs.Joint:
     kind = node.choice("type", _Type, "joint type").spec
     for role in ("parent", "child"):
         if _role(node, role) not in links:
-            raise DescriptionError(node.where, f"{role} '{_role(node, role)}' is not a link", f"allowed: {links}")
+            raise DescriptionError(node.location, f"{role} '{_role(node, role)}' is not a link", f"allowed: {links}")
     if (mimic := node.find("mimic")) is not None:
         notes.add(mimic, "has no effect, as in Gazebo; the joint moves independently")
     limit, dynamics = node.find("limit"), node.find("dynamics")
@@ -297,7 +299,7 @@ def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, not
         lower, upper = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0)
         if lower > upper:
             problem = f"got lower {lower:g} and upper {upper:g}"
-            raise DescriptionError(limit.where, problem, "allowed: a lower limit below the upper limit")
+            raise DescriptionError(limit.location, problem, "allowed: a lower limit below the upper limit")
     return specs.Joint(
         node.name(),
         kind,
@@ -312,20 +314,22 @@ def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, not
         dynamics=extensions.dynamics(
             node.name(), _number(dynamics, "damping", 0.0), _number(dynamics, "friction", 0.0)
         ),
-        where=node.where,
+        location=node.location,
     )
 
 
 def _axis(node: XmlNode) -> Vector3:
     axis = node.find("axis")
-    x, y, z = parse_numbers(axis.where, axis.attributes.get("xyz", "1 0 0"), 3) if axis is not None else (1.0, 0.0, 0.0)
+    x, y, z = (
+        parse_numbers(axis.location, axis.attributes.get("xyz", "1 0 0"), 3) if axis is not None else (1.0, 0.0, 0.0)
+    )
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
-        raise DescriptionError((axis or node).where, "got an axis of length 0", "expected a direction")
+        raise DescriptionError((axis or node).location, "got an axis of length 0", "expected a direction")
     return (x / length, y / length, z / length)
 
 
 def _number(node: XmlNode | None, attribute: str, default: float) -> float:
     if node is None or attribute not in node.attributes:
         return default
-    return parse_numbers(node.where, node.attributes[attribute], 1)[0]
+    return parse_numbers(node.location, node.attributes[attribute], 1)[0]

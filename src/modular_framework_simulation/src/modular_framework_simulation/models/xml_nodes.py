@@ -40,7 +40,7 @@ class XmlNode:
     children: list[XmlNode] = field(default_factory=list)
 
     @property
-    def where(self) -> str:
+    def location(self) -> str:
         """Returns source, line and tag, for the start of an error message."""
         name = self.attributes.get("name")
         label = f"<{self.tag} name='{name}'>" if name is not None else f"<{self.tag}>"
@@ -70,7 +70,7 @@ class XmlNode:
         child = self.find(tag)
         if child is None:
             children = ", ".join(f"<{each.tag}>" for each in self.children) or "nothing"
-            raise DescriptionError(self.where, f"has no <{tag}>", f"a <{tag}> is required, got {children}")
+            raise DescriptionError(self.location, f"has no <{tag}>", f"a <{tag}> is required, got {children}")
         return child
 
     def name(self) -> str:
@@ -81,7 +81,7 @@ class XmlNode:
         """
         value = self.attributes.get("name", "")
         if not value:
-            raise DescriptionError(self.where, "has no name", "give it a non-empty attribute 'name'")
+            raise DescriptionError(self.location, "has no name", "give it a non-empty attribute 'name'")
         return value
 
     def numbers(self, count: int) -> tuple[float, ...]:
@@ -90,7 +90,7 @@ class XmlNode:
         Raises:
             DescriptionError: The number of values is different, or a value is not a finite number.
         """
-        return parse_numbers(self.where, self.text, count)
+        return parse_numbers(self.location, self.text, count)
 
     def number_list(self, min_count: int, max_count: int) -> tuple[float, ...]:
         """Parses the text as finite values.
@@ -103,7 +103,7 @@ class XmlNode:
             DescriptionError: The number of values is outside the range, or a value is not a finite number.
         """
         count = min(max(len(self.text.split()), min_count), max_count)
-        return parse_numbers(self.where, self.text, count)
+        return parse_numbers(self.location, self.text, count)
 
     def number(self) -> float:
         """Parses the text as one finite number."""
@@ -125,7 +125,7 @@ class XmlNode:
             return choices(value)
         except ValueError as error:
             allowed = ", ".join(each.value for each in choices)
-            raise DescriptionError(self.where, f"got {noun} '{value}'", f"allowed: {allowed}") from error
+            raise DescriptionError(self.location, f"got {noun} '{value}'", f"allowed: {allowed}") from error
 
     def flag(self) -> bool:
         """Parses the text as a bool.
@@ -138,14 +138,14 @@ class XmlNode:
             return True
         if value in ("false", "0"):
             return False
-        raise DescriptionError(self.where, f"got '{value}'", "allowed: true, false, 1, 0")
+        raise DescriptionError(self.location, f"got '{value}'", "allowed: true, false, 1, 0")
 
 
-def parse_numbers(where: str, text: str, count: int) -> tuple[float, ...]:
+def parse_numbers(location: str, text: str, count: int) -> tuple[float, ...]:
     """Parses a text as a given number of finite values.
 
     Args:
-        where: Location for the error message.
+        location: Location for the error message.
         text: Numbers separated by white space.
         count: Expected number of values.
 
@@ -158,7 +158,7 @@ def parse_numbers(where: str, text: str, count: int) -> tuple[float, ...]:
     except ValueError:
         values = ()
     if len(words) != count or len(values) != count or not all(math.isfinite(value) for value in values):
-        raise DescriptionError(where, f"got '{text.strip()}'", f"expected {count} finite number(s)")
+        raise DescriptionError(location, f"got '{text.strip()}'", f"expected {count} finite number(s)")
     return values
 
 
@@ -178,7 +178,7 @@ def parse_xml(text: str, source: str) -> XmlNode:
     try:
         return _node(xml_text.parse(_with_valid_start(text), source), source)
     except xml_text.XmlError as error:
-        raise DescriptionError(error.where, error.found, error.allowed) from error
+        raise DescriptionError(error.location, error.found, error.allowed) from error
 
 
 def _with_valid_start(text: str) -> str:

@@ -179,7 +179,7 @@ def _matter(element: Element, model: str, log: Log) -> tuple[MassProperties, tup
     return _mass(element.find("inertial"), f"model '{model}', link '{name}'", log), shapes
 
 
-def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
+def _mass(inertial: Element | None, location: str, log: Log) -> MassProperties:
     if inertial is None:  # only a root that is fixed to the world has no inertia
         return MassProperties(0.0, (0.0, 0.0, 0.0), Pose())
     record = inertial.find("inertia")
@@ -189,8 +189,8 @@ def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
     moments = principal.inertia[0], principal.inertia[3], principal.inertia[5]
     if is_impossible(moments, _MOMENT_TOLERANCE):
         log(
-            f"{where}: no rigid body has the moments of inertia {list(moments)}, because the largest exceeds the sum "
-            "of the others; MuJoCo rejects them, and their mean is used for all three"
+            f"{location}: no rigid body has the moments of inertia {list(moments)}, because the largest exceeds the "
+            "sum of the others; MuJoCo rejects them, and their mean is used for all three"
         )
         moments = (sum(moments) / 3.0,) * 3
     return MassProperties(mass, moments, principal.pose)

@@ -141,20 +141,20 @@ class Surface:
     kd: float | None = None
 
 
-def refuse_long_names(text: str, where: str) -> None:
+def refuse_long_names(text: str, location: str) -> None:
     """Raises DescriptionError if a name or file name in a URDF is too long for an engine.
 
     Args:
         text: URDF text.
-        where: Location for the error message.
+        location: Location for the error message.
     """
-    for element in xml_text.parse(text, where).iter():
+    for element in xml_text.parse(text, location).iter():
         for key in _NAMING_ATTRIBUTES:
             value = element.get(key, "")
             size = len(value.encode())
             if size > MAX_NAME_BYTES:
                 raise DescriptionError(
-                    f"{where}: <{element.tag} {key}='{value[:MAX_SHOWN_CHARACTERS]}...'>",
+                    f"{location}: <{element.tag} {key}='{value[:MAX_SHOWN_CHARACTERS]}...'>",
                     f"is {size:,} bytes long",
                     f"the physics engine takes at most {MAX_NAME_BYTES:,} bytes; use a shorter name",
                 )

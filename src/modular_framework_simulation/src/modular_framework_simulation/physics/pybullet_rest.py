@@ -159,7 +159,7 @@ class SleepingBodies:
         self._expect_motion()
         if body in self._woken:
             self.body_id(body)
-            if body not in self._loaded and self._rests(body):
+            if body not in self._loaded and self._is_at_rest(body):
                 self._waking.add(body)
             self._woken[body] = self._steps
             self._slept.discard(body)
@@ -199,9 +199,9 @@ class SleepingBodies:
         """Static bodies, and bodies that have been asleep for at least REST_LOOK_S."""
         return self._never_move | self._known
 
-    def _look(self) -> None:
+    def _update_sleeping(self) -> None:
         """Updates the sleeping bodies; this check detects bodies that the engine has woken by a contact."""
-        slept = {body for body in self._inside if self._rests(body)} | self._store.stored_poses.keys()
+        slept = {body for body in self._inside if self._is_at_rest(body)} | self._store.stored_poses.keys()
         self._known, self._slept = slept & self._slept, slept
         asleep = [body for body in self._known & self._inside if self._store.can_store(body)]
         if len(asleep) > MAX_ASLEEP:
@@ -222,7 +222,7 @@ class SleepingBodies:
         steps = self._steps - self._checked
         if not self._store.stored_poses or not (self._may_approach or steps >= _APPROACH_STEPS):
             return
-        moving = [*self._jointed, *(body for body in sorted(self._inside) if not self._rests(body))]
+        moving = [*self._jointed, *(body for body in sorted(self._inside) if not self._is_at_rest(body))]
         corners = {(body, link): box for body in moving for link, box in self._link_corners(body).items()}
         boxes = Boxes.of_corners(corners.values())
         before = Boxes.of_corners(self._corners.get(key, box) for key, box in corners.items())
@@ -242,7 +242,7 @@ class SleepingBodies:
         for body in self._woken:
             self.wake(body)
 
-    def _rests(self, body: int) -> bool:
+    def _is_at_rest(self, body: int) -> bool:
         """Returns whether a body sleeps; the velocities of a sleeping body are exactly 0."""
         if body in self._store.stored_poses:
             return True
@@ -267,7 +267,7 @@ class SleepingBodies:
         self._lost.clear()
         self._loaded.clear()
         if self._steps % round(REST_LOOK_S / self._settings.time_step_s) == 0:
-            self._look()
+            self._update_sleeping()
         if self._steps % round(_WAKE_PERIOD_S / self._settings.time_step_s) == 0:
             for body in self._jointed:
                 self.wake_touching(body)

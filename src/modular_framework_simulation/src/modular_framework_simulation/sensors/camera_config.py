@@ -35,13 +35,13 @@ class _Fault(ValueError):
 
 
 def read_cameras(
-    settings: Mapping[str, Any], where: str, locate: FrameLocator, seed: int = 0
+    settings: Mapping[str, Any], location: str, locate: FrameLocator, seed: int = 0
 ) -> tuple[list[Camera], list[str]]:
     """Reads the cameras.
 
     Args:
         settings: Contents of the file.
-        where: Location of the settings for messages.
+        location: Location of the settings for messages.
         locate: Function that finds the entity of a frame.
         seed: Random seed of the simulation, for noise.
 
@@ -57,7 +57,7 @@ def read_cameras(
             if topics is not None:
                 cameras.append(replace(_camera(name, section, topics, locate), seed=seed))
         except ValueError as error:
-            faults.append(f"{where}/{name}/{error}; this camera is not simulated")
+            faults.append(f"{location}/{name}/{error}; this camera is not simulated")
     return cameras, faults
 
 
@@ -125,12 +125,12 @@ def _placement(section: Mapping[str, Any]) -> tuple[str, Pose]:
     pose = _mapping(section, "initial_pose")
     position, orientation = _mapping(pose, "position"), _mapping(pose, "orientation")
     x, y, z = (_number(position, key, "initial_pose/position/") for key in "xyz")
-    where = "initial_pose/orientation/"
+    location = "initial_pose/orientation/"
     frame = _text(pose, "reference_frame").strip("/")
     if "w" in orientation:
-        a, b, c, w = (_number(orientation, key, where) for key in "xyzw")
+        a, b, c, w = (_number(orientation, key, location) for key in "xyzw")
         return frame, Pose((x, y, z), normalised_quaternion((a, b, c, w)))
-    roll, pitch, yaw = (_number(orientation, key, where) for key in "rpy")
+    roll, pitch, yaw = (_number(orientation, key, location) for key in "rpy")
     return frame, Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
 
 
@@ -148,8 +148,8 @@ def _text(section: Mapping[str, Any], key: str) -> str:
     return value
 
 
-def _number(section: Mapping[str, Any], key: str, where: str = "") -> float:
+def _number(section: Mapping[str, Any], key: str, location: str = "") -> float:
     value = section.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _Fault(f"{where}{key}: got {value!r}; expected a number")
+        raise _Fault(f"{location}{key}: got {value!r}; expected a number")
     return float(value)

@@ -178,7 +178,7 @@ class CameraImage:
     rgb: Image
     depth: Depth
 
-    def within(self, depth_range: tuple[float, float]) -> CameraImage:
+    def with_depth_range(self, depth_range: tuple[float, float]) -> CameraImage:
         """Returns the same image without depths outside a range [m]."""
         low, high = depth_range
         with np.errstate(invalid="ignore"):
@@ -194,5 +194,5 @@ class CameraImage:
         """
         if not source.active:
             return self
-        noisy = source.added_to(self.rgb.astype(np.float64)[None] / 255.0, time_ns)
+        noisy = source.add_noise(self.rgb.astype(np.float64)[None] / 255.0, time_ns)
         return CameraImage(np.rint(np.clip(noisy[0], 0.0, 1.0) * 255.0).astype(np.uint8), self.depth)

@@ -150,7 +150,7 @@ class JointLoad:
             self._world.engine.measure_joint_load(self._tree.number, self._index)
             self._world.rest.disturb()
         measured, self._measured = self._measured, True
-        return self._noisy(self._wrench()) if measured else None
+        return self._with_noise(self._wrench()) if measured else None
 
     def _wrench(self) -> Wrench:
         """Returns the wrench of the child link on its parent, or of the parent on the child, as the sensor specifies.
@@ -174,9 +174,9 @@ class JointLoad:
         parent_in_world = body.link_state(sensor.parent_link).pose if sensor.parent_link != WORLD else Pose()
         return parent_in_world.inverse() @ body.link_state(sensor.link).pose @ self._joint_in_child
 
-    def _noisy(self, wrench: Wrench) -> Wrench:
+    def _with_noise(self, wrench: Wrench) -> Wrench:
         exact = np.array([*wrench.force, *wrench.torque])
-        noisy = self._noise.added_to(exact, self._world.time_ns)
+        noisy = self._noise.add_noise(exact, self._world.time_ns)
         if noisy is exact:
             return wrench
         fx, fy, fz, tx, ty, tz = noisy.tolist()

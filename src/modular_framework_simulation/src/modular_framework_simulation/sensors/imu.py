@@ -192,7 +192,7 @@ class Imu:
         x, y, z = ((after - earlier) / elapsed_s - gravity for after, earlier, gravity in change)
         to_sensor = motion.pose.inverse().quaternion
         rate, force = rotate_vector(to_sensor, motion.twist.angular), rotate_vector(to_sensor, (x, y, z))
-        return self._noisy(ImuReading(self._orientation(motion.pose), rate, force), now_ns)
+        return self._with_noise(ImuReading(self._orientation(motion.pose), rate, force), now_ns)
 
     def _orientation(self, pose: Pose) -> Quaternion:
         orientation = pose.quaternion
@@ -200,9 +200,9 @@ class Imu:
             orientation = multiply_quaternions(Pose(quaternion=self._initial).inverse().quaternion, orientation)
         return multiply_quaternions(self._sensor.offset_rotation, orientation)
 
-    def _noisy(self, reading: ImuReading, time_ns: int) -> ImuReading:
+    def _with_noise(self, reading: ImuReading, time_ns: int) -> ImuReading:
         exact = np.array([*reading.angular_velocity, *reading.specific_force, *reading.orientation])
-        noisy = self._noise.added_to(exact, time_ns)
+        noisy = self._noise.add_noise(exact, time_ns)
         if noisy is exact:
             return reading
         wx, wy, wz, ax, ay, az = noisy[:6].tolist()

@@ -128,7 +128,7 @@ class Laser:
         ranges[np.isnan(ranges)] = np.inf
         ranges[ranges <= sensor.min_range] = -np.inf
         measured = np.isfinite(ranges)
-        noisy = self._noise.added_to(ranges[None, :], self._world.time_ns)[0]
+        noisy = self._noise.add_noise(ranges[None, :], self._world.time_ns)[0]
         return np.where(measured, np.clip(noisy, sensor.min_range, sensor.max_range), ranges)
 
 

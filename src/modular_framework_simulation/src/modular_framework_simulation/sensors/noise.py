@@ -72,7 +72,7 @@ class NoiseSource:
         """Returns a random generator for one time, with 2^64 numbers before the stream of the next nanosecond."""
         return np.random.Generator(np.random.Philox(key=self._key, counter=(stream << 192) | (time_ns << 64)))
 
-    def added_to(self, values: Values, time_ns: int) -> Values:
+    def add_noise(self, values: Values, time_ns: int) -> Values:
         """Returns values with noise; without noise, the same object.
 
         Args:
@@ -84,12 +84,12 @@ class NoiseSource:
         random = self._random(time_ns)
         return np.stack(
             [
-                self._noisy(row, noise, bias, random)
+                self._with_noise(row, noise, bias, random)
                 for row, noise, bias in zip(values, self._channels, self.biases, strict=True)
             ]
         )
 
     @staticmethod
-    def _noisy(values: Values, noise: Noise, bias: float, random: np.random.Generator) -> Values:
+    def _with_noise(values: Values, noise: Noise, bias: float, random: np.random.Generator) -> Values:
         noisy = values + bias + random.normal(noise.mean, noise.stddev, np.shape(values))
         return np.round(noisy / noise.precision) * noise.precision if noise.precision else noisy

@@ -76,7 +76,7 @@ def _colour(visual: Element, named_materials: dict[str, Element], link: str, log
     try:
         red, green, blue, alpha = (float(word) for word in text.split())
     except ValueError:
-        where = f"robot_description:{material.sourceline}: <material> of link '{link}'"
-        log(f"{where}: got rgba='{text}'; expected four numbers from 0 to 1; drawn grey")
+        location = f"robot_description:{material.sourceline}: <material> of link '{link}'"
+        log(f"{location}: got rgba='{text}'; expected four numbers from 0 to 1; drawn grey")
         return _DEFAULT_COLOUR
     return red, green, blue, alpha

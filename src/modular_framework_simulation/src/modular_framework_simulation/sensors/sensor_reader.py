@@ -120,13 +120,13 @@ def _read(parts: ModelParts, elements: Iterable[SensorElement], seed: int) -> Se
                 continue
             sensors.found.append(_reader(node, xml, seed)(xml))
         except ValueError as error:
-            line = f"{node.where}: {error}; this {node.tag} is not simulated"
+            line = f"{node.location}: {error}; this {node.tag} is not simulated"
             sensors.faults.setdefault(_fault_key(node, str(error)), line)
             continue
         unread = xml.sensor.unread() if xml.sensor is not xml.plugin else []
         unread += [f"plugin/{path}" for path in (xml.plugin.unread() if xml.plugin is not None else [])]
         if unread:
-            line = f"{node.where}: elements without effect: {', '.join(unread)}"
+            line = f"{node.location}: elements without effect: {', '.join(unread)}"
             sensors.faults.setdefault(_fault_key(node, line.partition(": elements")[2]), line)
     return sensors
 

@@ -107,8 +107,8 @@ class ViewerNode:
         Drawing has its own thread that the end of the process interrupts: a large mesh takes seconds on a busy CPU.
         """
         rospy.on_shutdown(self._ended.set)
-        for work in (self._draw_always, self._status.run):
-            threading.Thread(target=work, daemon=True).start()
+        for function in (self._draw_always, self._status.run):
+            threading.Thread(target=function, daemon=True).start()
         self._ended.wait()
 
     def _draw_always(self) -> None:
@@ -161,14 +161,14 @@ class ViewerNode:
         if self._is_due("search", _SEARCH_PERIOD_S):
             self._guard("looking for robot and cameras", self._search)
 
-    def _take(self, feed: Feed, work: Callable[[Any], None]) -> None:
+    def _take(self, feed: Feed, function: Callable[[Any], None]) -> None:
         for message in feed.take():
-            self._guard(feed.topic, lambda message=message: work(message))  # type: ignore[misc]
+            self._guard(feed.topic, lambda message=message: function(message))  # type: ignore[misc]
 
-    def _guard(self, name: str, work: Callable[[], None]) -> None:
+    def _guard(self, name: str, function: Callable[[], None]) -> None:
         """Runs a function; an exception is logged once, and the viewer continues."""
         try:
-            work()
+            function()
         except Exception as error:  # any node may publish invalid messages
             if self._ended.is_set():
                 return  # the server is closing

@@ -128,7 +128,7 @@ class Finger:
         if servo.get(mx64.TORQUE_CONTROL_MODE):
             wanted = mx64.from_direction_word(servo.get(mx64.GOAL_TORQUE)) / mx64.TORQUE_MAX
         else:
-            error = mx64.signed(servo.get(mx64.GOAL_POSITION)) - self.angle
+            error = mx64.from_signed_word(servo.get(mx64.GOAL_POSITION)) - self.angle
             wanted = servo.get(mx64.P_GAIN) / 8.0 * error / mx64.TORQUE_MAX
         return max(-limit, min(limit, wanted))
 

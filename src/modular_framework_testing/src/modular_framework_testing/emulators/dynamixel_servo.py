@@ -269,7 +269,7 @@ class DynamixelServo:
     def _is_goal_allowed(self) -> bool:
         goal = self.get(mx64.GOAL_POSITION)
         if self.multi_turn:
-            return abs(mx64.signed(goal)) <= MULTI_TURN_RANGE
+            return abs(mx64.from_signed_word(goal)) <= MULTI_TURN_RANGE
         low, high = self.get(mx64.CW_ANGLE_LIMIT), self.get(mx64.CCW_ANGLE_LIMIT)
         return low <= goal <= high or low == high == 0
 

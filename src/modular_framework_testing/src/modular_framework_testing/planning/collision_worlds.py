@@ -26,7 +26,7 @@ from modular_framework_testing.planning.independent_checker import (
     cone,
     cylinder,
     mesh,
-    sampled,
+    sampled_states,
     sphere,
 )
 
@@ -184,7 +184,7 @@ class Comparison:
         touching = self.ours.colliding_state(edge, FINEST)
         if touching is None:
             rest = dict(zip(names, start.tolist(), strict=True))
-            return Verdicts(1, 1, bool(self.second.touching_pairs(names, sampled(edge, DENSE), rest)))
+            return Verdicts(1, 1, bool(self.second.touching_pairs(names, sampled_states(edge, DENSE), rest)))
         values = dict(zip(names, touching.tolist(), strict=True))
         if self.second.collisions(values):
             return Verdicts(1)
