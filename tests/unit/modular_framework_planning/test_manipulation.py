@@ -12,7 +12,7 @@ import pytest
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.manipulation_messages import Hand, posture, translation
-from modular_framework_planning.pick_place.manipulation import Translation, allowing
+from modular_framework_planning.pick_place.manipulation import Translation, allow_contacts
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, empty_scene
 from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -76,10 +76,10 @@ def moving(x: float, y: float, z: float, frame: str, desired: float = 0.1, least
 def test_a_direction_turns_with_the_hand_only_in_a_frame_fixed_to_it(scene: PlanningScene) -> None:
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 1.2), np.array([0.1, 0.2, 0.3]))
     in_world = translation(scene, moving(0, 0, -2, "world"), "ee_link", "approach")
-    assert not in_world.in_tip and np.allclose(in_world.ending_at(pose, 0.1).translation, [0.1, 0.2, 0.2])
+    assert not in_world.in_tip and np.allclose(in_world.translated_pose(pose, 0.1).translation, [0.1, 0.2, 0.2])
     in_hand = translation(scene, moving(3, 0, 0, "ee_link"), "ee_link", "approach")
     assert in_hand.in_tip
-    assert np.allclose(in_hand.ending_at(pose, -0.1).translation, pose.translation - 0.1 * pose.rotation[:, 0])
+    assert np.allclose(in_hand.translated_pose(pose, -0.1).translation, pose.translation - 0.1 * pose.rotation[:, 0])
     same = scene.frame_transform("eg_manipulator").rotation.T @ scene.frame_transform("ee_link").rotation[:, 0]
     in_tip = translation(scene, moving(*same, "eg_manipulator"), "ee_link", "approach")
     assert in_tip.in_tip and np.allclose(in_tip.direction, [1, 0, 0], atol=1e-9)
@@ -116,11 +116,11 @@ def test_the_last_point_of_a_posture_counts() -> None:
 
 
 def test_allowing_changes_these_pairs_alone(scene: PlanningScene) -> None:
-    changed = allowing(scene, ["ezgripper_palm_link"], ["block", "table"])
+    changed = allow_contacts(scene, ["ezgripper_palm_link"], ["block", "table"])
     assert changed.acm.allows("ezgripper_palm_link", "table") and changed.acm.allows("block", "ezgripper_palm_link")
     assert not changed.acm.allows("forearm_link", "block") and not scene.acm.allows("ezgripper_palm_link", "block")
 
 
 def test_a_translation_goes_both_ways() -> None:
     way = Translation(np.array([0.0, 1.0, 0.0]), False, 0.2, 0.1)
-    assert np.allclose(way.ending_at(pin.SE3.Identity(), -0.2).translation, [0, -0.2, 0])
+    assert np.allclose(way.translated_pose(pin.SE3.Identity(), -0.2).translation, [0, -0.2, 0])

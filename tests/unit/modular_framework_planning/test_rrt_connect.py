@@ -93,7 +93,7 @@ def problem_in(
         max_velocity=np.ones(len(start)),
         max_acceleration=np.ones(len(start)),
         rng=np.random.default_rng(seed),
-        begun_s=now_s,
+        start_time_s=now_s,
         deadline_s=now_s + seconds,
         end_s=now_s + seconds,
         solution_validator=TrajectoryValidator(),
@@ -292,13 +292,13 @@ def test_a_checker_with_a_path_check_of_its_own_is_asked_and_not_gone_round(smal
 
 def test_the_clock_and_a_cancellation_end_the_search(small: RobotModel) -> None:
     scene = scene_with(small, WALL)
-    begun_s = time.monotonic()
+    start_time_s = time.monotonic()
     assert search(problem_in(scene, seconds=0.3), goal=UNREACHABLE).run() is None
-    assert 0.3 <= time.monotonic() - begun_s < 5.0
-    begun_s = time.monotonic()
+    assert 0.3 <= time.monotonic() - start_time_s < 5.0
+    start_time_s = time.monotonic()
     answers = iter([False] * 3 + [True] * 10)
     assert search(problem_in(scene, cancelled=lambda: next(answers)), goal=UNREACHABLE).run() is None
-    assert len(list(answers)) < 10 and time.monotonic() - begun_s < 5.0
+    assert len(list(answers)) < 10 and time.monotonic() - start_time_s < 5.0
 
 
 def test_the_smaller_tree_extends_until_it_is_as_large_as_the_other_one(small: RobotModel) -> None:

@@ -78,14 +78,14 @@ def test_the_fraction_counts_each_line_the_same(solver: InverseKinematics) -> No
     assert reached == pytest.approx(0.05 + (2.0 * line.fraction - 1.0) * 2.95, abs=1e-6)
 
 
-def test_an_objection_ends_the_line_with_its_reason(solver: InverseKinematics) -> None:
+def test_a_rejected_step_ends_the_line_with_its_reason(solver: InverseKinematics) -> None:
     asked: list[int] = []
 
-    def objection(_before: Array, _after: Array) -> str:
+    def reject_step(_before: Array, _after: Array) -> str:
         asked.append(1)
         return "a wall" if len(asked) == 4 else ""
 
-    line = straight_line(PoseFollower(solver, "flange", BENT), [ahead((0.1, 0, 0))], 0.01, objection=objection)
+    line = straight_line(PoseFollower(solver, "flange", BENT), [ahead((0.1, 0, 0))], 0.01, check_step=reject_step)
     assert line.fraction == pytest.approx(0.3) and line.stop == "waypoint 0, step 4 of 10: a wall"
     assert line.code == ErrorCode.INVALID_MOTION_PLAN and len(line.rows) == 4
 

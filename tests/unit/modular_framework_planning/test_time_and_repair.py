@@ -129,14 +129,14 @@ def test_the_planner_leaves_time_for_the_check_and_no_message_counts_from_a_late
         request(model, board=False)
     )
     problem = planner.asked[0]
-    assert problem.begun_s < problem.deadline_s < problem.end_s == pytest.approx(problem.begun_s + 60.0)
+    assert problem.start_time_s < problem.deadline_s < problem.end_s == pytest.approx(problem.start_time_s + 60.0)
     assert problem.end_s - problem.deadline_s == pytest.approx(0.25)
     improving = Coarse()
     PlanningPipeline(pool, PipelineSettings(seed=1), improving, adapters=make_adapters()).plan(
         replace(request(model, board=False), planner_id="BITstar")
     )
     assert improving.asked[0].end_s - improving.asked[0].deadline_s == pytest.approx(1.0), "it always uses all its time"
-    late = replace(problem, begun_s=time.monotonic() - 60.0, deadline_s=time.monotonic() - 0.3)
+    late = replace(problem, start_time_s=time.monotonic() - 60.0, deadline_s=time.monotonic() - 0.3)
     error = no_path(late, "BITstar", 5)
     assert error.code == ErrorCode.TIMED_OUT and "in 60.0" in error.reason and "time ran out after 5" in error.reason
     early = no_path(problem, "FMT", 5)

@@ -24,7 +24,7 @@ RADIANS_PER_METRE = 3.5  # a step of 0.01 m may rotate by 0.035 rad, as in MoveI
 MAX_STEPS = 50_000  # maximum number of steps per request
 MIN_STEPS_FOR_MEAN = 10  # minimum number of steps per line for the mean step of jump detection
 
-Objection = Callable[[Array, Array], str]
+StepCheck = Callable[[Array, Array], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +64,12 @@ class StraightLine:
     code: ErrorCode
 
 
-def no_objection(_before: Array, _after: Array) -> str:
+def accept_step(_before: Array, _after: Array) -> str:
     """Accepts every step."""
     return ""
 
 
-def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: float) -> Objection:
+def collision_check(checker: CollisionChecker, motion: MotionChecker, step: float) -> StepCheck:
     """Returns a function that rejects steps in collision and names the contacts.
 
     Args:
@@ -78,14 +78,14 @@ def collision_objection(checker: CollisionChecker, motion: MotionChecker, step: 
         step: Distance between two checked states [rad or m].
     """
 
-    def objection(before: Array, after: Array) -> str:
+    def check_step(before: Array, after: Array) -> str:
         touching = motion.colliding_state(np.vstack([before, after]), step)
         if touching is None:
             return ""
         contacts = checker.contacts(motion.full_positions(touching), include_fixed=False)
         return "; ".join(item.describe() for item in contacts[:4]) or "a collision"
 
-    return objection
+    return check_step
 
 
 def straight_line(
@@ -94,7 +94,7 @@ def straight_line(
     max_step_m: float,
     *,
     jumps: JumpThresholds = NO_JUMP_TEST,
-    objection: Objection = no_objection,
+    check_step: StepCheck = accept_step,
     carried: Transform | None = None,
 ) -> StraightLine:
     """Follows straight lines through waypoints until a step is not allowed.
@@ -104,7 +104,7 @@ def straight_line(
         waypoints: Poses of the moved frame in the planning frame.
         max_step_m: Maximum step [m].
         jumps: Thresholds of a joint-space jump.
-        objection: Function of the joint positions before and after a step; returns the reason to reject it, or "".
+        check_step: Function of the joint positions before and after a step; returns the reason to reject it, or "".
         carried: Pose of the moved frame in the link frame, such as the pose of a held object; None for the link frame.
 
     Raises:
@@ -117,7 +117,7 @@ def straight_line(
     to_link = pin.SE3.Identity() if carried is None else carried.inverse()
     poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]
     lines = [
-        _Line(follower, (before, after, to_link), min(max_step_m, MAX_STEP_M), jumps, objection)
+        _Line(follower, (before, after, to_link), min(max_step_m, MAX_STEP_M), jumps, check_step)
         for before, after in zip(poses[:-1], poses[1:], strict=True)
     ]
     _require_countable(lines, max_step_m)
@@ -175,7 +175,7 @@ class _Line:
         ends: tuple[Transform, Transform, Transform],
         step_m: float,
         jumps: JumpThresholds,
-        objection: Objection,
+        check_step: StepCheck,
     ) -> None:
         """Divides the line into steps.
 
@@ -184,11 +184,11 @@ class _Line:
             ends: First and last pose of the moved frame, and pose of the link in the moved frame.
             step_m: Maximum step [m].
             jumps: Thresholds of a joint-space jump.
-            objection: Function that returns the reason to reject a step, or "".
+            check_step: Function that returns the reason to reject a step, or "".
         """
         start, end, self._to_link = ends
         self._follower, self._start, self._end = follower, start, end
-        self._jumps, self._objection = jumps, objection
+        self._jumps, self._check_step = jumps, check_step
         self._rotation_vector = pin.log3(start.rotation.T @ end.rotation)
         length = float(np.linalg.norm(end.translation - start.translation))
         angle = float(np.linalg.norm(self._rotation_vector))
@@ -218,7 +218,7 @@ class _Line:
             except PlanningError as error:
                 stop, code = error.reason, error.code
                 break
-            stop = self._jump(rows[-1], values) or self._objection(rows[-1], values)
+            stop = self._jump(rows[-1], values) or self._check_step(rows[-1], values)
             if stop:
                 code = ErrorCode.INVALID_MOTION_PLAN
                 break

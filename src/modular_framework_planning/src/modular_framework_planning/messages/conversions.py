@@ -35,14 +35,16 @@ LOGGER = logging.getLogger("rosout.goals")
 BODY_TYPES = {LINK: 0, WORLD: 1, ATTACHED: 2}
 
 
-def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[float], where: str) -> dict[str, float]:
+def joint_values(
+    model: RobotModel, names: Sequence[str], positions: Sequence[float], field_name: str
+) -> dict[str, float]:
     """Returns positions by joint name, without fixed joints.
 
     Args:
         model: Robot model.
         names: Joint names.
         positions: Position of each joint [rad or m].
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The lengths differ, a joint is unknown, or a value is not finite.
@@ -50,23 +52,23 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
     if len(names) != len(positions):
         raise PlanningError(
             ErrorCode.INVALID_ROBOT_STATE,
-            f"{where}: {len(names)} joint names and {len(positions)} positions; give one position per name",
+            f"{field_name}: {len(names)} joint names and {len(positions)} positions; give one position per name",
         )
     values = {}
     for name, position in zip(names, positions, strict=True):
         if name not in model.index:
             if model.document.joint_kinds.get(name) == "fixed":
                 continue
-            raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint", name, model.joint_names)
+            raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, f"{field_name}: joint", name, model.joint_names)
         if not np.isfinite(position):
             raise PlanningError(
-                ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; give a finite number"
+                ErrorCode.INVALID_ROBOT_STATE, f"{field_name}: joint '{name}' is {position}; give a finite number"
             )
         values[name] = float(position)
     return values
 
 
-def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robot state") -> PlanningScene:
+def scene_with_state(scene: PlanningScene, state: RobotState, field_name: str = "robot state") -> PlanningScene:
     """Returns the scene with the robot in the state of a message.
 
     Unnamed joints and an unnamed planar or floating base keep their positions. A state that names joints and is not a
@@ -75,12 +77,12 @@ def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robo
     Args:
         scene: Scene.
         state: State message.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
     """
     if names_joints(state):
-        values = joint_values(scene.model, state.joint_state.name, state.joint_state.position, where)
+        values = joint_values(scene.model, state.joint_state.name, state.joint_state.position, field_name)
         scene = scene.with_positions(scene.model.merge(scene.positions, values))
-        scene = with_multi_dof(scene, state.multi_dof_joint_state, where)
+        scene = with_multi_dof(scene, state.multi_dof_joint_state, field_name)
         if not state.is_diff:
             scene = scene.without_attached(scene.attached)
     for item in state.attached_collision_objects:
@@ -129,14 +131,14 @@ def goals_from_constraints(
     return tuple(_goal(scene, item, tip, f"goal_constraints[{index}]") for index, item in enumerate(constraints))
 
 
-def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal | ConstraintGoal:
-    constraints = constraints_from_message(scene, item, where, ErrorCode.INVALID_GOAL_CONSTRAINTS, tip)
+def _goal(scene: PlanningScene, item: Any, tip: str, field_name: str) -> JointGoal | PoseGoal | ConstraintGoal:
+    constraints = constraints_from_message(scene, item, field_name, ErrorCode.INVALID_GOAL_CONSTRAINTS, tip)
     if constraints.is_empty:
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
-            f"{where}: no constraint; give joint, position or orientation constraints",
+            f"{field_name}: no constraint; give joint, position or orientation constraints",
         )
-    constraints = _without_passive_joints(scene, constraints, where)
+    constraints = _without_passive_joints(scene, constraints, field_name)
     joints = constraints.joints
     if len({joint.name for joint in joints}) == len(joints) and not (constraints.positions or constraints.orientations):
         return JointGoal(
@@ -154,25 +156,25 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
 
 
 def _without_passive_joints(
-    scene: PlanningScene, constraints: KinematicConstraints, where: str
+    scene: PlanningScene, constraints: KinematicConstraints, field_name: str
 ) -> KinematicConstraints:
     """Returns the constraints without passive joints; a violated constraint on a passive joint is logged."""
     passive = [item for item in constraints.joints if item.name in scene.model.passive_joints]
     for item in passive:
         result = item.evaluate(None, scene.positions)
         if not result.satisfied:
-            LOGGER.warning("%s: %s; the joint is passive and stays there", where, result.text)
+            LOGGER.warning("%s: %s; the joint is passive and stays there", field_name, result.text)
     if not passive:
         return constraints
     active = [item for item in constraints.joints if item not in passive]
     return KinematicConstraints(scene.model, active, constraints.positions, constraints.orientations, constraints.name)
 
 
-def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
+def refuse_constraints(field_name: str, constraints: Any, code: ErrorCode) -> None:
     """Raises PlanningError if constraints are given where they are not supported.
 
     Args:
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
         constraints: moveit_msgs/Constraints.
         code: Error code.
     """
@@ -184,7 +186,7 @@ def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
             constraints.visibility_constraints,
         )
     ):
-        raise PlanningError(code, f"{where}: constraints are not supported here; leave them empty")
+        raise PlanningError(code, f"{field_name}: constraints are not supported here; leave them empty")
 
 
 def trajectory_message(trajectory: Trajectory, model: RobotModel) -> RobotTrajectory:

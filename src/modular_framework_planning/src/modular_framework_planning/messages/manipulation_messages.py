@@ -12,7 +12,7 @@ import numpy as np
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.messages.poses import stamped_in_scene
-from modular_framework_planning.pick_place.manipulation import Manoeuvre, Translation, allowing
+from modular_framework_planning.pick_place.manipulation import Manoeuvre, Translation, allow_contacts
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
     CollisionObject,
@@ -39,14 +39,14 @@ class Hand:
     mimics: Mapping[str, Mimic]
 
 
-def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Translation:
+def translation(scene: PlanningScene, message: Any, link: str, field_name: str) -> Translation:
     """Reads a GripperTranslation; a direction in a frame fixed to the link rotates with the link.
 
     Args:
         scene: Scene with the poses of frames.
         message: moveit_msgs/GripperTranslation.
         link: Link that the translation moves.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The frame is unknown, the direction is zero, or a distance is invalid.
@@ -58,7 +58,7 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
     if not (np.isfinite(direction).all() and np.isfinite(distances).all() and (distances >= 0.0).all()):
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
-            f"{where}: direction {direction.tolist()}, "
+            f"{field_name}: direction {direction.tolist()}, "
             f"desired_distance {desired}, min_distance {minimum}; give finite numbers, and distances "
             "of at least 0",
         )
@@ -68,7 +68,7 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
         if desired > 0.0:
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                f"{where}: the direction is zero, but the desired distance is {desired} m; give a direction",
+                f"{field_name}: the direction is zero, but the desired distance is {desired} m; give a direction",
             )
         return Translation(np.array([0.0, 0.0, 1.0]), False, 0.0, 0.0)
     frame = message.direction.header.frame_id.removeprefix("/")
@@ -85,7 +85,7 @@ def _is_rigid(scene: PlanningScene, first: str, second: str) -> bool:
     return joint == frames[ids[second]].parentJoint and joint != 0
 
 
-def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
+def posture(message: Any, hand: Hand, field_name: str) -> dict[str, float]:
     """Reads a posture of the fingers from the last point of a trajectory; empty if no joint is named.
 
     As in MoveIt, a mimic joint only counts if its leader is not named.
@@ -93,7 +93,7 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     Args:
         message: trajectory_msgs/JointTrajectory.
         hand: End effector.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: A joint does not belong to the end effector, or a position is missing or not finite.
@@ -104,14 +104,14 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
     unknown = [name for name in message.joint_names if name not in known]
     if unknown:
         raise UnknownNameError(
-            ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where}: joint of the end effector", unknown[0], known
+            ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{field_name}: joint of the end effector", unknown[0], known
         )
     points = message.points
     values = list(points[-1].positions) if points else []
     if len(values) != len(message.joint_names) or not np.isfinite(values).all():
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
-            f"{where}: {len(points)} points, the last with "
+            f"{field_name}: {len(points)} points, the last with "
             f"{len(values)} positions for {len(message.joint_names)} joints; give one finite position "
             "per joint",
         )
@@ -125,15 +125,15 @@ def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> Sc
         others.append(surface)
 
     def allow(scene: PlanningScene) -> PlanningScene:
-        scene = allowing(scene, hand.links, others)
-        return allowing(scene, [target], [surface]) if surface else scene
+        scene = allow_contacts(scene, hand.links, others)
+        return allow_contacts(scene, [target], [surface]) if surface else scene
 
     return allow
 
 
-def _require_quality(value: float, where: str) -> None:
+def _require_quality(value: float, field_name: str) -> None:
     if not np.isfinite(value):
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where} is {value}; give a finite number")
+        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{field_name} is {value}; give a finite number")
 
 
 def attaching(target: str, link: str, touch_links: Sequence[str]) -> SceneChange:
@@ -157,7 +157,7 @@ def attaching(target: str, link: str, touch_links: Sequence[str]) -> SceneChange
     return change
 
 
-def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, where: str) -> Manoeuvre:
+def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, field_name: str) -> Manoeuvre:
     """Reads one Grasp of a PickupGoal.
 
     Args:
@@ -165,28 +165,28 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
         goal: moveit_msgs/PickupGoal.
         grasp: moveit_msgs/Grasp.
         hand: End effector.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The grasp is invalid.
     """
-    _require_quality(grasp.grasp_quality, f"{where}.grasp_quality")
+    _require_quality(grasp.grasp_quality, f"{field_name}.grasp_quality")
     touch = list(goal.attached_object_touch_links) or [*hand.links, hand.link]
     return Manoeuvre(
-        name=grasp.id or where,
-        tip_pose=stamped_in_scene(scene, grasp.grasp_pose, f"{where}.grasp_pose"),
-        approach=translation(scene, grasp.pre_grasp_approach, hand.link, f"{where}.pre_grasp_approach"),
-        retreat=translation(scene, grasp.post_grasp_retreat, hand.link, f"{where}.post_grasp_retreat"),
+        name=grasp.id or field_name,
+        tip_pose=stamped_in_scene(scene, grasp.grasp_pose, f"{field_name}.grasp_pose"),
+        approach=translation(scene, grasp.pre_grasp_approach, hand.link, f"{field_name}.pre_grasp_approach"),
+        retreat=translation(scene, grasp.post_grasp_retreat, hand.link, f"{field_name}.post_grasp_retreat"),
         allow=_allowance(hand, goal.target_name, goal, grasp.allowed_touch_objects),
         effect=attaching(goal.target_name, hand.link, touch),
-        fingers_before=posture(grasp.pre_grasp_posture, hand, f"{where}.pre_grasp_posture"),
-        fingers_after=posture(grasp.grasp_posture, hand, f"{where}.grasp_posture"),
+        fingers_before=posture(grasp.pre_grasp_posture, hand, f"{field_name}.pre_grasp_posture"),
+        fingers_after=posture(grasp.grasp_posture, hand, f"{field_name}.grasp_posture"),
         closing_in=goal.minimize_object_distance,
     )
 
 
 def place_manoeuvre(
-    scene: PlanningScene, goal: Any, location: Any, *, hand: Hand, held: AttachedObject, where: str
+    scene: PlanningScene, goal: Any, location: Any, *, hand: Hand, held: AttachedObject, field_name: str
 ) -> Manoeuvre:
     """Reads one PlaceLocation of a PlaceGoal.
 
@@ -196,22 +196,22 @@ def place_manoeuvre(
         location: moveit_msgs/PlaceLocation.
         hand: End effector.
         held: Object to place.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The location is invalid.
     """
-    _require_quality(location.quality, f"{where}.quality")
-    pose = stamped_in_scene(scene, location.place_pose, f"{where}.place_pose")
+    _require_quality(location.quality, f"{field_name}.quality")
+    pose = stamped_in_scene(scene, location.place_pose, f"{field_name}.place_pose")
     return Manoeuvre(
-        name=location.id or where,
+        name=location.id or field_name,
         tip_pose=pose if goal.place_eef else _link_pose(scene, pose, held, hand.link),
-        approach=translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
-        retreat=translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
+        approach=translation(scene, location.pre_place_approach, hand.link, f"{field_name}.pre_place_approach"),
+        retreat=translation(scene, location.post_place_retreat, hand.link, f"{field_name}.post_place_retreat"),
         allow=_allowance(hand, held.name, goal, location.allowed_touch_objects),
         effect=lambda current: current.with_detached(held.name),
         fingers_before={},
-        fingers_after=posture(location.post_place_posture, hand, f"{where}.post_place_posture"),
+        fingers_after=posture(location.post_place_posture, hand, f"{field_name}.post_place_posture"),
         middle="release",
     )
 

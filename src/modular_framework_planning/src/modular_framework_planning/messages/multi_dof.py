@@ -26,10 +26,10 @@ def names_joints(state: RobotState) -> bool:
     return bool(state.joint_state.name or state.multi_dof_joint_state.joint_names)
 
 
-def transform_of(message: TransformMessage, where: str) -> Transform:
+def transform_of(message: TransformMessage, field_name: str) -> Transform:
     """Reads a transform; an unset rotation is the identity. Raises GeometryError."""
     t, q = message.translation, message.rotation
-    return make_transform((t.x, t.y, t.z), quaternion_or_identity((q.x, q.y, q.z, q.w), where), where)
+    return make_transform((t.x, t.y, t.z), quaternion_or_identity((q.x, q.y, q.z, q.w), field_name), field_name)
 
 
 def transform_message(transform: Transform) -> TransformMessage:
@@ -44,13 +44,13 @@ def transform_message(transform: Transform) -> TransformMessage:
     return message
 
 
-def with_multi_dof(scene: PlanningScene, state: MultiDOFJointState, where: str) -> PlanningScene:
+def with_multi_dof(scene: PlanningScene, state: MultiDOFJointState, field_name: str) -> PlanningScene:
     """Returns the scene with the base at the pose in a message; fixed joints in the message are ignored.
 
     Args:
         scene: Scene with the poses of frames.
         state: Transforms of joints; an empty header frame is the planning frame.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The counts of names and transforms differ, a joint is unknown or has one variable only, a
@@ -59,19 +59,19 @@ def with_multi_dof(scene: PlanningScene, state: MultiDOFJointState, where: str) 
     if len(state.joint_names) != len(state.transforms):
         raise PlanningError(
             ErrorCode.INVALID_ROBOT_STATE,
-            f"{where}: multi_dof_joint_state with {len(state.joint_names)} joint names and {len(state.transforms)} "
-            "transforms; give one transform per name",
+            f"{field_name}: multi_dof_joint_state with {len(state.joint_names)} joint names and "
+            f"{len(state.transforms)} transforms; give one transform per name",
         )
     model = scene.model
     for name, message in zip(state.joint_names, state.transforms, strict=True):
         if model.base is not None and name == model.base.name:
             frame = scene.frame_transform(state.header.frame_id)
-            transform = frame * transform_of(message, f"{where}: multi_dof_joint_state '{name}'")
+            transform = frame * transform_of(message, f"{field_name}: multi_dof_joint_state '{name}'")
             scene = scene.with_positions(model.with_base(scene.positions, transform))
         elif not _is_fixed(model, name):
             raise UnknownNameError(
                 ErrorCode.INVALID_ROBOT_STATE,
-                f"{where}: multi_dof_joint_state: planar or floating joint",
+                f"{field_name}: multi_dof_joint_state: planar or floating joint",
                 name,
                 [model.base.name] if model.base else [],
             )
@@ -84,13 +84,13 @@ def _is_fixed(model: RobotModel, name: str) -> bool:
     return model.document.joint_kinds.get(name) == "fixed" or name in virtual
 
 
-def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, code: ErrorCode) -> list[Any]:
+def with_angles(scene: PlanningScene, constraints: Sequence[Any], field_name: str, code: ErrorCode) -> list[Any]:
     """Replaces joint constraints on the quaternion of a floating base by constraints on the base's angles.
 
     Args:
         scene: Scene; its current angles decide between equivalent angles.
         constraints: Messages of type moveit_msgs/JointConstraint, as MoveIt's clients write them from a state.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
         code: Error code for invalid constraints.
 
     Raises:
@@ -105,11 +105,11 @@ def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, co
     if len(components) != len(base.quaternion):
         raise PlanningError(
             code,
-            f"{where}: joint constraints on {', '.join(components)} only; give all of {', '.join(base.quaternion)}, or "
-            f"{', '.join(base.angles)} [rad]",
+            f"{field_name}: joint constraints on {', '.join(components)} only; "
+            f"give all of {', '.join(base.quaternion)}, or {', '.join(base.angles)} [rad]",
         )
     try:
-        rotation = make_transform((0.0, 0.0, 0.0), [components[name].position for name in base.quaternion], where)
+        rotation = make_transform((0.0, 0.0, 0.0), [components[name].position for name in base.quaternion], field_name)
     except GeometryError as error:
         raise PlanningError(code, error.reason) from error
     values = base.values(rotation, scene.positions[model.base_indices])

@@ -9,10 +9,10 @@ from modular_framework_planning.geometry.spatial import Transform, make_transfor
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
 
-def transform_from_pose(pose: Pose, where: str) -> Transform:
+def transform_from_pose(pose: Pose, field_name: str) -> Transform:
     """Reads a pose; raises GeometryError."""
     p, q = pose.position, pose.orientation
-    return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), where)
+    return make_transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), field_name)
 
 
 def pose_message(transform: Transform) -> Pose:
@@ -24,15 +24,15 @@ def pose_message(transform: Transform) -> Pose:
     return pose
 
 
-def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, where: str) -> Transform:
+def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, field_name: str) -> Transform:
     """Returns a stamped pose in the planning frame.
 
     Args:
         scene: Scene with the poses of frames.
         stamped: Pose message.
-        where: Name of the message field, for error messages.
+        field_name: Name of the message field, for error messages.
 
     Raises:
         PlanningError: The frame is unknown, or the pose is invalid.
     """
-    return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, where)
+    return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, field_name)

@@ -23,9 +23,9 @@ from modular_framework_planning.planning_scene.allowed_collisions import Allowed
 from modular_framework_planning.planning_scene.planning_scene import OCTOMAP_ID, PlanningScene
 
 
-def _transform(pose: Any, where: str) -> Transform:
+def _transform(pose: Any, field_name: str) -> Transform:
     p, q = pose.position, pose.orientation
-    return make_transform((p.x, p.y, p.z), quaternion_or_identity((q.x, q.y, q.z, q.w), where), where)
+    return make_transform((p.x, p.y, p.z), quaternion_or_identity((q.x, q.y, q.z, q.w), field_name), field_name)
 
 
 def _is_unset(pose: Any) -> bool:
@@ -33,7 +33,7 @@ def _is_unset(pose: Any) -> bool:
     return all(value == 0.0 for value in (p.x, p.y, p.z, q.x, q.y, q.z, q.w))
 
 
-def _primitive(message: Any, where: str) -> Shape:
+def _primitive(message: Any, field_name: str) -> Shape:
     kinds: dict[int, tuple[type[Any], int]] = {
         SolidPrimitive.BOX: (Box, 3),
         SolidPrimitive.SPHERE: (Sphere, 1),
@@ -42,27 +42,29 @@ def _primitive(message: Any, where: str) -> Shape:
     }
     if message.type not in kinds:
         raise GeometryError(
-            f"{where}: primitive type {message.type}; allowed types: 1 box, 2 sphere, 3 cylinder, 4 cone"
+            f"{field_name}: primitive type {message.type}; allowed types: 1 box, 2 sphere, 3 cylinder, 4 cone"
         )
     kind, count = kinds[message.type]
     if len(message.dimensions) < count:
-        raise GeometryError(f"{where}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; give {count}")
+        raise GeometryError(
+            f"{field_name}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; give {count}"
+        )
     try:
         return kind(*message.dimensions[:count])
     except GeometryError as error:
-        raise GeometryError(f"{where}: {error.reason}") from error
+        raise GeometryError(f"{field_name}: {error.reason}") from error
 
 
-def _mesh(message: Any, where: str) -> Shape:
+def _mesh(message: Any, field_name: str) -> Shape:
     vertices = np.array([(p.x, p.y, p.z) for p in message.vertices], dtype=float).reshape(-1, 3)
     triangles = np.array([t.vertex_indices for t in message.triangles], dtype=np.int64).reshape(-1, 3)
     try:
         return Mesh(vertices, triangles)
     except GeometryError as error:
-        raise GeometryError(f"{where}: {error.reason}") from error
+        raise GeometryError(f"{field_name}: {error.reason}") from error
 
 
-def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
+def _shapes(message: Any, field_name: str) -> tuple[tuple[Shape, Transform], ...]:
     result: list[tuple[Shape, Transform]] = []
     for kind, items, poses, build in (
         ("primitive", message.primitives, message.primitive_poses, _primitive),
@@ -70,32 +72,34 @@ def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
         ("plane", message.planes, message.plane_poses, lambda item, _: Plane(*item.coef)),
     ):
         if len(poses) > len(items):
-            raise GeometryError(f"{where}: {len(items)} {kind} shapes and {len(poses)} poses; give one pose per shape")
+            raise GeometryError(
+                f"{field_name}: {len(items)} {kind} shapes and {len(poses)} poses; give one pose per shape"
+            )
         for index, item in enumerate(items):
-            source = f"{where} {kind} {index}"
+            source = f"{field_name} {kind} {index}"
             pose = _transform(poses[index], source) if index < len(poses) else pin.SE3.Identity()
             result.append((build(item, source), pose))
     return tuple(result)
 
 
-def _object_pose(scene: PlanningScene, message: Any, where: str) -> Transform:
+def _object_pose(scene: PlanningScene, message: Any, field_name: str) -> Transform:
     """Returns the object's pose in the planning frame; an unset pose means the pose of the header's frame."""
     frame = scene.frame_transform(message.header.frame_id)
-    return frame if _is_unset(message.pose) else frame * _transform(message.pose, where)
+    return frame if _is_unset(message.pose) else frame * _transform(message.pose, field_name)
 
 
 def _body(scene: PlanningScene, message: Any) -> core.CollisionObject:
-    where = f"collision object '{message.id}'"
+    field_name = f"collision object '{message.id}'"
     if len(message.subframe_names) != len(message.subframe_poses):
         raise GeometryError(
-            f"{where}: {len(message.subframe_names)} subframe names and "
+            f"{field_name}: {len(message.subframe_names)} subframe names and "
             f"{len(message.subframe_poses)} poses; give one pose per name"
         )
     subframes = {
-        name: _transform(pose, f"{where} subframe '{name}'")
+        name: _transform(pose, f"{field_name} subframe '{name}'")
         for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)
     }
-    pose, shapes = _object_pose(scene, message, where), _shapes(message, where)
+    pose, shapes = _object_pose(scene, message, field_name), _shapes(message, field_name)
     if len(shapes) == 1 and _is_unset(message.pose):  # as in MoveIt, the only shape sets the object's pose
         shape, pose_in_header = shapes[0]
         pose, shapes = pose * pose_in_header, ((shape, pin.SE3.Identity()),)
@@ -124,11 +128,11 @@ def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> Pl
 
 def _move(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
     """Moves an object and, if the message has shape poses, its shapes; geometry in the message is ignored."""
-    where = f"collision object '{message.id}'"
+    field_name = f"collision object '{message.id}'"
     scene.find_object(message.id)
-    pose = _object_pose(scene, message, where)
+    pose = _object_pose(scene, message, field_name)
     shape_poses = [
-        _transform(item, f"{where} shape {index}")
+        _transform(item, f"{field_name} shape {index}")
         for index, item in enumerate((*message.primitive_poses, *message.mesh_poses, *message.plane_poses))
     ]
     if len(shape_poses) == 1 and _is_unset(message.pose):  # as in ADD, the only shape sets the object's pose

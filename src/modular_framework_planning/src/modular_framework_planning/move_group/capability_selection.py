@@ -46,10 +46,10 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
         (rospy.resolve_name("~disable_capabilities"), name) for name in _split(parameter("~disable_capabilities"))
     ]
     known = list(dict.fromkeys(item.name for item in table))
-    for where, name in (*requested, *disabled):
+    for source_name, name in (*requested, *disabled):
         if name not in known:
             rospy.logwarn(
-                "%s: unknown capability '%s'; known: %s%s", where, name, ", ".join(known), nearest(name, known)
+                "%s: unknown capability '%s'; known: %s%s", source_name, name, ", ".join(known), nearest(name, known)
             )
     enabled, removed = ({name for _, name in items} for items in (requested, disabled))
     return [item.build for item in table if (item.default or item.name in enabled) and item.name not in removed]

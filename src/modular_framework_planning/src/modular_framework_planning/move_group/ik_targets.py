@@ -88,10 +88,10 @@ class IkTarget:
     def failure_reason(self, solver: InverseKinematics, seed: Array) -> str:
         """Returns the reason why no solution exists."""
         if solver.settings.position_only:
-            where = np.array2string(self.target.translation, precision=3, separator=", ")
+            source_name = np.array2string(self.target.translation, precision=3, separator=", ")
             return (
                 f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
-                f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)"
+                f"'{solver.group.name}' reach the position {source_name} m, whatever the orientation (position_only_ik)"
             )
         return solver.explain_unreachable(self.link, self.target * self.offset.inverse(), seed)
 
@@ -159,7 +159,7 @@ def solvers_of(kinematics: KinematicsPool, model: RobotModel, group: JointGroup,
             f"group '{group.name}' {kind}; got {len(links)} links to place ({', '.join(links)}), but inverse "
             "kinematics needs one chain per link",
         )
-    candidates = [[item for item in subgroups if _moves(model, item, link)] for link in links]
+    candidates = [[item for item in subgroups if _moves_link(model, item, link)] for link in links]
     unmatched = [link for link, solvers in zip(links, candidates, strict=True) if not solvers]
     if unmatched:
         raise PlanningError(
@@ -188,7 +188,7 @@ def _ends(model: RobotModel, groups: Sequence[JointGroup]) -> str:
     return "subgroups and their tips: " + (", ".join(f"{item.name} ({item.tip_link})" for item in groups) or "none")
 
 
-def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
+def _moves_link(model: RobotModel, group: JointGroup, link: str) -> bool:
     """Returns whether a link is at the end of a chain."""
     return model.is_carried(link, model.document.joint_children[group.joints[-1]])
 

@@ -50,16 +50,16 @@ def scene_change(options: Any, keep_state: bool) -> SceneChange:
     return lambda scene: apply_scene(scene, diff)
 
 
-def with_current_start(request: Any, where: str) -> Any:
+def with_current_start(request: Any, source_name: str) -> Any:
     """Returns a copy of the request that starts at the current state, as an executed motion must.
 
     Args:
         request: moveit_msgs/MotionPlanRequest.
-        where: Name of the request in a warning.
+        source_name: Name of the request in a warning.
     """
     start = request.start_state
     if names_joints(start) or start.attached_collision_objects:
-        rospy.logwarn("%s.start_state is ignored: an executed motion starts at the current state", where)
+        rospy.logwarn("%s.start_state is ignored: an executed motion starts at the current state", source_name)
     request = copy.copy(request)
     request.start_state = RobotState(is_diff=True)
     return request

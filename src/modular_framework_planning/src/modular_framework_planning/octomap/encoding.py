@@ -120,7 +120,7 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         return empty_map(resolution)
     node_bytes = 2 if binary else FULL_NODE.itemsize
     if len(data) % node_bytes:
-        raise _broken(f"{len(data)} bytes, which is not a multiple of the {node_bytes} bytes of a node")
+        raise _broken_stream_error(f"{len(data)} bytes, which is not a multiple of the {node_bytes} bytes of a node")
     if binary:
         codes = np.frombuffer(data, "<u2").astype(np.uint16)
         read, starts, depths, occupied = read_binary(codes, LEVELS)
@@ -131,17 +131,17 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         values = nodes["value"][indices].astype(np.float32)
     count = len(data) // node_bytes
     if read != count:
-        raise _broken(
+        raise _broken_stream_error(
             "a tree that is truncated or deeper than 16 levels"
             if read < 0
             else f"{count - read} nodes after the end of the tree"
         )
     if not np.isfinite(values).all():
-        raise _broken("an occupancy that is not finite")
+        raise _broken_stream_error("an occupancy that is not finite")
     return _expanded_map(resolution, starts, depths, np.clip(values, LOWEST, HIGHEST))
 
 
-def _broken(content: str) -> GeometryError:
+def _broken_stream_error(content: str) -> GeometryError:
     return GeometryError(
         f"octomap data: got {content}; expected the pre-order stream of one OcTree; send data written by octomap"
     )

@@ -83,39 +83,44 @@ class VoxelMap:
         """Returns the codes of the voxels that contain points, shape (n, 3) [m], without points outside the tree."""
         return cells_of_points(np.asarray(points, dtype=float).reshape(-1, 3), self.resolution, AXIS_CENTER)
 
-    def with_cloud(self, free: Keys, occupied: Keys, masked: Keys) -> VoxelMap:
+    def with_cloud(self, free_cells: Keys, occupied_cells: Keys, masked_cells: Keys) -> VoxelMap:
         """Returns the map updated by one point cloud.
 
         Args:
-            free: Voxels along rays.
-            occupied: Voxels at the ends of rays; they count as hit even if other rays pass through them.
-            masked: Voxels at the ends of rays on the robot or on a known object; they become free at once.
+            free_cells: Voxels along rays.
+            occupied_cells: Voxels at the ends of rays; they count as hit even if other rays pass through them.
+            masked_cells: Voxels at the ends of rays on the robot or on a known object; they become free at once.
         """
-        keys = np.concatenate([free, occupied, masked])
-        steps = np.repeat(np.array([MISS, HIT, LOWEST - HIGHEST], np.float32), [len(free), len(occupied), len(masked)])
+        keys = np.concatenate([free_cells, occupied_cells, masked_cells])
+        steps = np.repeat(
+            np.array([MISS, HIT, LOWEST - HIGHEST], np.float32),
+            [len(free_cells), len(occupied_cells), len(masked_cells)],
+        )
         order = np.argsort(keys, kind="stable")
         keys, steps = keys[order], steps[order]
         is_last = np.append(keys[1:] != keys[:-1], True)[: len(keys)]  # the strongest update of each voxel
         return VoxelMap(self.resolution, *merge(self.keys, self.values, keys[is_last], steps[is_last], LOWEST, HIGHEST))
 
-    def with_point_cloud(self, origin: Array, hits: Array, masked: Array, clipped: Array) -> VoxelMap:
+    def with_point_cloud(self, origin: Array, hits: Array, masked_points: Array, clipped: Array) -> VoxelMap:
         """Returns the map updated by rays, which mark the voxels of their end points and clear all voxels before.
 
         Args:
             origin: Position of the sensor, shape (3,) [m].
             hits: Points on unknown obstacles, shape (n, 3) [m].
-            masked: Points on the robot and on known objects, shape (n, 3) [m].
+            masked_points: Points on the robot and on known objects, shape (n, 3) [m].
             clipped: Points at maximum range on rays that ended beyond, shape (n, 3) [m].
         """
-        occupied, known, beyond = (distinct(self.keys_of_points(points)) for points in (hits, masked, clipped))
-        ends = self.centers(np.concatenate([occupied, known, beyond])) / self.resolution + AXIS_CENTER
+        occupied_cells, known, beyond = (
+            distinct(self.keys_of_points(points)) for points in (hits, masked_points, clipped)
+        )
+        ends = self.centers(np.concatenate([occupied_cells, known, beyond])) / self.resolution + AXIS_CENTER
         start = np.asarray(origin, dtype=float) / self.resolution + AXIS_CENTER
         if not ((start >= 0.0) & (start < 2 * AXIS_CENTER)).all():
             raise GeometryError(
                 f"octomap: the sensor is at {np.round(origin, 2).tolist()} m, outside the map; with voxels of "
                 f"{self.resolution} m, a map reaches {AXIS_CENTER * self.resolution:.0f} m in each direction"
             )
-        return self.with_cloud(np.sort(cells_on_rays(start, ends)), occupied, known)
+        return self.with_cloud(np.sort(cells_on_rays(start, ends)), occupied_cells, known)
 
     def with_free_cells(self, keys: Keys) -> VoxelMap:
         """Returns the map with the given voxels set to free; unknown voxels stay unknown."""

@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 from modular_framework_planning.cartesian.cartesian_path import (
-    Objection,
+    StepCheck,
     StraightLine,
-    collision_objection,
+    collision_check,
     straight_line,
 )
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
@@ -43,7 +43,7 @@ DISTANCE_TOLERANCE_M = 1.0e-6
 Posture = Mapping[str, float]
 
 
-def allowing(scene: PlanningScene, links: Iterable[str], others: Iterable[str]) -> PlanningScene:
+def allow_contacts(scene: PlanningScene, links: Iterable[str], others: Iterable[str]) -> PlanningScene:
     """Returns the scene with contact allowed between two sets of bodies.
 
     Args:
@@ -74,7 +74,7 @@ class Translation:
     desired_distance_m: float
     min_distance_m: float
 
-    def ending_at(self, pose: Transform, distance_m: float) -> Transform:
+    def translated_pose(self, pose: Transform, distance_m: float) -> Transform:
         """Returns the pose moved along the direction by a distance, which may be negative."""
         step = (pose.rotation @ self.direction if self.in_tip else self.direction) * distance_m
         return pin.SE3(pose.rotation, pose.translation + step)
@@ -224,18 +224,18 @@ class ManoeuvrePlanner:
             checker = self._new_checker(scene, indices, shallow)
         return checker, MotionChecker(checker, indices, scene.positions)
 
-    def _objection(self, scene: PlanningScene) -> Objection:
+    def _step_check(self, scene: PlanningScene) -> StepCheck:
         """Returns a check of a step that finds violated path constraints, then collisions."""
         checker, motion = self._checkers(scene)
-        collides = collision_objection(checker, motion, CHECK_STEP)
+        collides = collision_check(checker, motion, CHECK_STEP)
 
-        def objection(before: Array, after: Array) -> str:
+        def check_step(before: Array, after: Array) -> str:
             full = motion.full_positions(after)
             if self._constraints is not None and not self._constraints.are_satisfied(full):
                 return f"path constraints: {self._constraints.describe(full)}"
             return collides(before, after)
 
-        return objection
+        return check_step
 
     def _reachable(self, manoeuvre: Manoeuvre, scene: PlanningScene) -> list[Array]:
         """Returns collision-free arm configurations at the grasp, nearest first; raises PlanningError."""
@@ -268,19 +268,19 @@ class ManoeuvrePlanner:
         arm, pose = self._arm, manoeuvre.tip_pose
         at_grasp = scene.with_positions(self._full_positions(scene, values))
         translation, name = manoeuvre.approach, manoeuvre.name
-        back = self._line(at_grasp, translation.ending_at(pose, -translation.desired_distance_m))
+        back = self._line(at_grasp, translation.translated_pose(pose, -translation.desired_distance_m))
         approach = _long_enough(f"{name}: approach (checked backwards from the grasp)", back, translation)[::-1]
         if manoeuvre.closing_in:
             untouched = self._with_fingers(self._template.scene, manoeuvre.fingers_before)
             further = self._line(
                 untouched.with_positions(at_grasp.positions),
-                translation.ending_at(pose, translation.desired_distance_m),
+                translation.translated_pose(pose, translation.desired_distance_m),
             )
             approach = np.vstack([approach, further.rows[1:]])
             at_grasp = scene.with_positions(self._full_positions(scene, approach[-1]))
             pose = at_grasp.frame_transform(arm.link)
         held = self._after_fingers(manoeuvre, at_grasp)
-        retreat = self._line(held, manoeuvre.retreat.ending_at(pose, manoeuvre.retreat.desired_distance_m))
+        retreat = self._line(held, manoeuvre.retreat.translated_pose(pose, manoeuvre.retreat.desired_distance_m))
         return approach, _long_enough(f"{name}: retreat", retreat, manoeuvre.retreat)
 
     def _after_fingers(self, manoeuvre: Manoeuvre, at_grasp: PlanningScene) -> PlanningScene:
@@ -298,7 +298,7 @@ class ManoeuvrePlanner:
             PoseFollower(self._arm.solver, self._arm.link, scene.positions),
             [end],
             self._settings.cartesian_motion_step_size,
-            objection=self._objection(scene),
+            check_step=self._step_check(scene),
         )
 
     def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
@@ -326,10 +326,10 @@ class ManoeuvrePlanner:
         stages = [Stage("plan", self._template.scene, _unchanged_scene, to_approach)]
         if before:
             stages.append(Stage("pre_grasp", ready, allow, fingers=before))
-        if _moves(approach):
+        if _has_motion(approach):
             stages.append(Stage("approach", ready, allow, self._timed_line(ready, approach)))
         stages.append(Stage(manoeuvre.middle, at_grasp, allow, None, manoeuvre.fingers_after, manoeuvre.effect))
-        if _moves(retreat):
+        if _has_motion(retreat):
             stages.append(Stage("retreat", held, allow, self._timed_line(held, retreat)))
         return tuple(stages)
 
@@ -345,7 +345,7 @@ class ManoeuvrePlanner:
         )
 
 
-def _moves(rows: Array) -> bool:
+def _has_motion(rows: Array) -> bool:
     return bool(np.abs(rows - rows[0]).max() > 0.0)
 
 
@@ -361,12 +361,12 @@ class _LineTooShort(PlanningError):
         self.fraction = fraction
 
 
-def _long_enough(where: str, line: StraightLine, translation: Translation) -> Array:
+def _long_enough(source_name: str, line: StraightLine, translation: Translation) -> Array:
     """Returns the joint vectors of a line; raises _LineTooShort if the line is shorter than the minimum distance."""
     distance = line.fraction * translation.desired_distance_m
     if distance < translation.min_distance_m - DISTANCE_TOLERANCE_M:
         raise _LineTooShort(
-            f"{where}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m; at least "
+            f"{source_name}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m; at least "
             f"{translation.min_distance_m:.3f} m are required; {line.stop}",
             line.fraction,
         )

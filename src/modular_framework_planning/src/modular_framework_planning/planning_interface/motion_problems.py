@@ -37,26 +37,26 @@ def _load(path: Path) -> Mapping[str, Any]:
         raise ModelError(f"{path}: cannot be read as YAML: {error}") from error
 
 
-def _pose(entry: Mapping[str, Sequence[float]] | None, where: str) -> Transform:
+def _pose(entry: Mapping[str, Sequence[float]] | None, source_name: str) -> Transform:
     if not entry:
         return pin.SE3.Identity()
-    return make_transform(entry["position"], entry["orientation"], where)
+    return make_transform(entry["position"], entry["orientation"], source_name)
 
 
-def _shape(entry: Mapping[str, Any], where: str) -> Shape:
+def _shape(entry: Mapping[str, Any], source_name: str) -> Shape:
     kind = str(entry["type"])
     if kind not in SHAPES:
-        raise GeometryError(f"{where}: primitive '{kind}'; allowed: {', '.join(SHAPES)}")
+        raise GeometryError(f"{source_name}: primitive '{kind}'; allowed: {', '.join(SHAPES)}")
     return SHAPES[kind](*entry["dimensions"])
 
 
-def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, where: str) -> PlanningScene:
+def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, source_name: str) -> PlanningScene:
     """Returns the scene with the planar or floating base at its pose in the multi_dof_joint_state of a robot state."""
     entry, base = (state or {}).get("multi_dof_joint_state") or {}, scene.model.base
     frame = str((entry.get("header") or {}).get("frame_id", ""))
     for name, item in zip(entry.get("joint_names") or (), entry.get("transforms") or (), strict=True):
         if base is not None and name == base.name:
-            pose = make_transform(item["translation"], item["rotation"], f"{where} '{name}'")
+            pose = make_transform(item["translation"], item["rotation"], f"{source_name} '{name}'")
             placed = scene.frame_transform(frame) * pose
             scene = scene.with_positions(scene.model.with_base(scene.positions, placed))
     return scene
@@ -67,13 +67,14 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
     content = _load(path)
     scene = _with_base(empty_scene(model), content.get("robot_state"), path.name)
     for entry in content["world"]["collision_objects"]:
-        where = f"{path.name} '{entry['id']}'"
+        source_name = f"{path.name} '{entry['id']}'"
         poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
         shapes = tuple(
-            (_shape(item, where), _pose(pose, where)) for item, pose in zip(entry["primitives"], poses, strict=True)
+            (_shape(item, source_name), _pose(pose, source_name))
+            for item, pose in zip(entry["primitives"], poses, strict=True)
         )
         frame = scene.frame_transform(str((entry.get("header") or {}).get("frame_id", "")))
-        scene = scene.with_object(CollisionObject(entry["id"], frame * _pose(entry.get("pose"), where), shapes))
+        scene = scene.with_object(CollisionObject(entry["id"], frame * _pose(entry.get("pose"), source_name), shapes))
     return scene
 
 

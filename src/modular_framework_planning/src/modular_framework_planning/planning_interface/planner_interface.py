@@ -69,7 +69,7 @@ class PlanningProblem:
         settings: Settings of the pipeline.
         max_velocity, max_acceleration: Limits of the group's joints with scaling applied, shape (joints,).
         rng: Random generator of the planner, so that a seed repeats a plan.
-        begun_s, end_s: Monotonic time at the start of the request and at the end of its allowed time [s].
+        start_time_s, end_s: Monotonic time at the start of the request and at the end of its allowed time [s].
         deadline_s: Monotonic time at which the planner must stop [s]; the remaining time is reserved for the
             validation.
         solution_validator: Validator of every timed motion.
@@ -92,7 +92,7 @@ class PlanningProblem:
     max_velocity: Array
     max_acceleration: Array
     rng: np.random.Generator
-    begun_s: float
+    start_time_s: float
     deadline_s: float
     end_s: float
     solution_validator: SolutionValidator
@@ -185,7 +185,7 @@ class PlanningProblem:
         """
         if self.repeatable and not self.interrupted():
             return False
-        return self.cancelled() or time.monotonic() > 0.5 * (self.begun_s + self.deadline_s)
+        return self.cancelled() or time.monotonic() > 0.5 * (self.start_time_s + self.deadline_s)
 
     def state_is_valid(self, values: Array) -> bool:
         """Checks that a joint vector is free of collisions and satisfies the path constraints."""
@@ -346,7 +346,7 @@ def no_path(problem: PlanningProblem, planner_name: str, checks: int | None = No
         planner_name: Name of the planner.
         checks: Number of checked states and edges, if known.
     """
-    elapsed_s = time.monotonic() - problem.begun_s
+    elapsed_s = time.monotonic() - problem.start_time_s
     effort = "" if checks is None else f" after {checks} checks"
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {elapsed_s:.2f} s{effort}")

@@ -10,12 +10,12 @@ from typing import Any
 from modular_framework_planning.errors import ModelError, PlanningError
 
 
-def plugin_class(path: str, where: str, allowed: str) -> Any:
+def plugin_class(path: str, source_name: str, allowed: str) -> Any:
     """Returns a plugin class.
 
     Args:
         path: Class name as `module/Class`.
-        where: Parameter and value, for error messages.
+        source_name: Parameter and value, for error messages.
         allowed: Allowed values, for error messages.
 
     Raises:
@@ -23,12 +23,14 @@ def plugin_class(path: str, where: str, allowed: str) -> Any:
     """
     module, _, name = path.partition("/")
     if not re.fullmatch(r"[A-Za-z_][\w.]*", module) or not name.isidentifier():
-        raise ModelError(f"{where} is not known; {allowed}")
+        raise ModelError(f"{source_name} is not known; {allowed}")
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise ModelError(f"{where} is not known ({error}); {allowed}") from error
+        raise ModelError(f"{source_name} is not known ({error}); {allowed}") from error
     except PlanningError:
         raise
     except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be reported
-        raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; fix the module") from error
+        raise ModelError(
+            f"{source_name}: its module fails with {type(error).__name__}: {error}; fix the module"
+        ) from error

@@ -45,8 +45,8 @@ from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_ros.allowed_names import nearest
 
 RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # time reserved for repair, timing and validation
-RESERVED_IMPROVING_S = 1.0  # larger reserve for anytime planners, which always use all of their time
-COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
+ANYTIME_RESERVED_S = 1.0  # larger reserve for anytime planners, which always use all of their time
+COLLISION_ERROR_CODES = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 LOGGER = logging.getLogger("rosout.planning_pipeline")
 
 
@@ -125,7 +125,7 @@ class PlanningPipeline:
         except PlanningError as error:
             error.statistics = phases.statistics()
             code = self._planner.collision_code
-            if error.code in COLLISIONS and code is not None:
+            if error.code in COLLISION_ERROR_CODES and code is not None:
                 raise PlanningError(code, error.reason, error.contacts, error.statistics) from error
             raise
 
@@ -267,7 +267,7 @@ class PlanningPipeline:
             max_velocity=velocity,
             max_acceleration=acceleration,
             rng=np.random.default_rng(seed),
-            begun_s=start_s,
+            start_time_s=start_s,
             deadline_s=start_s + request.allowed_time_s - self._reserved_s(request.allowed_time_s, planner_id),
             end_s=start_s + request.allowed_time_s,
             solution_validator=TrajectoryValidator(),
@@ -290,20 +290,20 @@ class PlanningPipeline:
     def _reserved_s(self, allowed_time_s: float, planner_id: str) -> float:
         """Returns the time reserved for path repair, time parameterization and validation [s]."""
         improves = planner_id in self._planner.improving_ids
-        return min(RESERVED_IMPROVING_S if improves else RESERVED_S, RESERVED_FRACTION * allowed_time_s)
+        return min(ANYTIME_RESERVED_S if improves else RESERVED_S, RESERVED_FRACTION * allowed_time_s)
 
-    def _chosen_planner(self, requested: str, group: str) -> tuple[str, dict[str, Any], str]:
+    def _chosen_planner(self, requested_planner: str, group: str) -> tuple[str, dict[str, Any], str]:
         """Returns the planner name, its settings, and the requested name if the default planner replaces it."""
         default, allowed = self.settings.default_planner(group), self.planner_ids
-        planner_id, parameters = self._configuration(without_group(requested or default), group)
+        planner_id, parameters = self._configuration(without_group(requested_planner or default), group)
         replaced = ""
-        if requested and allowed and planner_id not in allowed and self._planner.replaces_bad_values:
+        if requested_planner and allowed and planner_id not in allowed and self._planner.replaces_bad_values:
             planner_id, parameters = self._configuration(without_group(default), group)
-            replaced = requested
+            replaced = requested_planner
             LOGGER.warning(
                 "planner_id '%s': pipeline '%s' has no such planner; allowed: %s%s; group '%s' uses "
                 "the default planner '%s'",
-                requested,
+                requested_planner,
                 self.name,
                 ", ".join(allowed),
                 nearest(planner_id, allowed),
@@ -314,7 +314,7 @@ class PlanningPipeline:
         if allowed and planner_id not in allowed:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
-                f"planner_id '{requested}': pipeline '{self.name}' has no planner '{planner_id}'; "
+                f"planner_id '{requested_planner}': pipeline '{self.name}' has no planner '{planner_id}'; "
                 f"allowed: {', '.join(allowed)}{nearest(planner_id, allowed)}",
             )
         return planner_id, parameters, replaced
@@ -350,9 +350,9 @@ class PlanningPipeline:
         )
 
 
-def _require_time(request: PlanningRequest, begun_s: float) -> None:
+def _require_time(request: PlanningRequest, start_time_s: float) -> None:
     """Raises PlanningError if a request is cancelled or out of time before the search."""
-    elapsed_s = time.monotonic() - begun_s
+    elapsed_s = time.monotonic() - start_time_s
     if request.cancelled():
         raise PlanningError(
             ErrorCode.PREEMPTED,
@@ -378,7 +378,7 @@ def _validation_error(problem: PlanningProblem, fault: str) -> PlanningError:
     """Returns the error of a request whose paths all failed the validation."""
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")
-    elapsed_s = time.monotonic() - problem.begun_s
+    elapsed_s = time.monotonic() - problem.start_time_s
     if problem.interrupted():
         return PlanningError(
             ErrorCode.TIMED_OUT,

@@ -35,9 +35,9 @@ class Padding:
 
     def __post_init__(self) -> None:
         named = {f"of link '{link}'": value for link, value in self.links.items()}
-        for where, value in {**named, "of world objects": self.objects, "of held objects": self.attached}.items():
+        for source_name, value in {**named, "of world objects": self.objects, "of held objects": self.attached}.items():
             if not np.isfinite(value) or value < 0.0:
-                raise GeometryError(f"padding {where}: got {value} m; give a finite length of at least 0 m")
+                raise GeometryError(f"padding {source_name}: got {value} m; give a finite length of at least 0 m")
         for link, value in self.scales.items():
             if not np.isfinite(value) or value <= 0.0:
                 raise GeometryError(f"scale of link '{link}': got {value}; give a finite number above 0")

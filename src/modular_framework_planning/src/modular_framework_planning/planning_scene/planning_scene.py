@@ -199,13 +199,13 @@ class PlanningScene:
     def without_object(self, name: str) -> PlanningScene:
         """Removes an object and its colour from the world; raises UnknownNameError."""
         self.find_object(name)
-        return self._without(objects={name})
+        return self._without_entries(objects={name})
 
     def without_objects(self) -> PlanningScene:
         """Removes every object and its colour from the world; attached objects stay."""
-        return self._without(objects=self.objects.keys())
+        return self._without_entries(objects=self.objects.keys())
 
-    def _without(self, **names: Set[str]) -> PlanningScene:
+    def _without_entries(self, **names: Set[str]) -> PlanningScene:
         """Returns the scene without the named `objects` or `attached` objects and their colours."""
         changes: dict[str, object] = {}
         for kind, removed in names.items():
@@ -251,7 +251,7 @@ class PlanningScene:
 
     def without_attached(self, names: Iterable[str]) -> PlanningScene:
         """Deletes attached bodies and their colours."""
-        return self._without(attached=set(names))
+        return self._without_entries(attached=set(names))
 
     def attached_pose(self, name: str) -> Transform:
         """Returns the pose of an attached body in the planning frame at the scene's joint positions."""

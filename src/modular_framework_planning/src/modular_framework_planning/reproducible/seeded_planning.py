@@ -31,7 +31,7 @@ GRACE_S = 30.0  # time beyond the allowed planning time until the child process 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 
 
-def _never() -> bool:
+def _never_cancelled() -> bool:
     return False
 
 
@@ -67,7 +67,13 @@ class SeededPlanning:
         connection = self._connect()
         try:
             configurations = pipeline.configurations.snapshot()
-            message = (pipeline.name, pipeline.settings, configurations, seed, replace(request, cancelled=_never))
+            message = (
+                pipeline.name,
+                pipeline.settings,
+                configurations,
+                seed,
+                replace(request, cancelled=_never_cancelled),
+            )
             connection.send_bytes(to_bytes(message))
             self._wait(connection, request)
             result = from_bytes(connection.recv_bytes(), self._model)

@@ -54,12 +54,12 @@ def _chain_to(model: RobotModel, group: JointGroup, link: str) -> JointGroup | N
     chains = [
         item
         for item in (group, *model.groups.values())
-        if set(item.joints) <= set(group.joints) and _moves(model, item, link)
+        if set(item.joints) <= set(group.joints) and _moves_link(model, item, link)
     ]
     return group if group in chains else min(chains, key=lambda item: len(item.joints), default=None)
 
 
-def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
+def _moves_link(model: RobotModel, group: JointGroup, link: str) -> bool:
     """Checks that a link is rigidly fixed to the end of a group's chain."""
     if not group.is_chain or not model.has_link(link):
         return False

@@ -179,10 +179,10 @@ def _primitive(shape: urdf.Shape) -> Shape | None:
 
 def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
     """Yields the collision shapes of a link; raises ModelError for an unreadable mesh or an unknown shape."""
-    where = f"URDF link '{link.name}' collision"
+    source_name = f"URDF link '{link.name}' collision"
     for shape, pose in _placed_shapes(link.collisions):
         if isinstance(shape, urdf.UnknownShape):
-            raise ModelError(f"{where}: <{shape.tag}>; allowed: box, capsule, cylinder, sphere and mesh")
+            raise ModelError(f"{source_name}: <{shape.tag}>; allowed: box, capsule, cylinder, sphere and mesh")
         try:
             if isinstance(shape, urdf.MeshFile):
                 mesh = read_mesh(resolve(shape.uri), shape.scale)
@@ -190,9 +190,9 @@ def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
             elif (primitive := _primitive(shape)) is not None:
                 yield primitive, pose
         except MeshError as error:
-            raise ModelError(f"{where}: {error}") from error
+            raise ModelError(f"{source_name}: {error}") from error
         except GeometryError as error:
-            raise ModelError(f"{where}: {error.reason}") from error
+            raise ModelError(f"{source_name}: {error.reason}") from error
 
 
 def load_urdf(

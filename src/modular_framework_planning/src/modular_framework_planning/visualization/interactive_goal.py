@@ -376,9 +376,9 @@ class InteractiveGoal:
         return pose_message(self._model.base_transform(self._goal))
 
     def _positions_of(self, state: RobotState) -> Array:
-        where, joints = "robot state", state.joint_state
-        scene = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, where)
-        return self._model.merge(scene.positions, joint_values(self._model, joints.name, joints.position, where))
+        source_name, joints = "robot state", state.joint_state
+        scene = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, source_name)
+        return self._model.merge(scene.positions, joint_values(self._model, joints.name, joints.position, source_name))
 
     def _state_of(self, positions: Array) -> RobotState:
         """Returns a diff to the current state, so that held objects stay attached."""

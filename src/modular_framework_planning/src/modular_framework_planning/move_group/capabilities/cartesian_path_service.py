@@ -12,10 +12,10 @@ from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
 
 from modular_framework_planning.cartesian.cartesian_path import (
     JumpThresholds,
-    Objection,
+    StepCheck,
     StraightLine,
-    collision_objection,
-    no_objection,
+    accept_step,
+    collision_check,
     straight_line,
 )
 from modular_framework_planning.constraints.robot_frames import frame_on_robot, require_holding_link
@@ -75,7 +75,7 @@ class CartesianPathService(ServiceCapability):
                 jumps=JumpThresholds(
                     request.jump_threshold, request.prismatic_jump_threshold, request.revolute_jump_threshold
                 ),
-                objection=self._objection(lines, request),
+                check_step=self._step_check(lines, request),
                 carried=lines.offset,
             )
             trajectory = self._timed_trajectory(lines, path, request)
@@ -123,21 +123,21 @@ class CartesianPathService(ServiceCapability):
             checker=checker,
         )
 
-    def _objection(self, lines: _Lines, request: Any) -> Objection:
+    def _step_check(self, lines: _Lines, request: Any) -> StepCheck:
         """Returns a check of a step that finds violated path constraints, then collisions."""
         constraints = constraints_from_message(
             lines.scene, request.path_constraints, "path_constraints", tip=lines.link
         )
-        collides = no_objection
+        collides = accept_step
         if lines.checker is not None:
-            collides = collision_objection(lines.checker, lines.motion, self._context.pipeline("").settings.motion_step)
+            collides = collision_check(lines.checker, lines.motion, self._context.pipeline("").settings.motion_step)
 
-        def objection(before: Array, after: Array) -> str:
+        def check_step(before: Array, after: Array) -> str:
             if not constraints.is_empty and not constraints.are_satisfied(lines.motion.full_positions(after)):
                 return f"path_constraints: {constraints.describe(lines.motion.full_positions(after))}"
             return collides(before, after)
 
-        return objection
+        return check_step
 
     def _timed_trajectory(self, lines: _Lines, path: StraightLine, request: Any) -> Trajectory:
         model, indices = lines.scene.model, lines.group.indices

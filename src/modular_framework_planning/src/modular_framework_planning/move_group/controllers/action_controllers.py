@@ -68,10 +68,10 @@ def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = 
         kinds: Accepted controller types.
         default_kind: Type of entries without a type.
     """
-    where = rospy.resolve_name("~controller_list")
+    source_name = rospy.resolve_name("~controller_list")
     specs, faults = parse_controllers(parameter("~controller_list") or [], kinds, default_kind)
     for fault in faults:
-        rospy.logerr("%s: %s; this controller is left out", where, fault)
+        rospy.logerr("%s: %s; this controller is left out", source_name, fault)
     return tuple(specs)
 
 

@@ -75,7 +75,7 @@ class _Motion:
 Admission = Callable[[Sequence[PathWatch]], None]
 
 
-def _always(_: Sequence[PathWatch]) -> None:
+def _admit_always(_: Sequence[PathWatch]) -> None:
     """Admits every motion."""
 
 
@@ -155,7 +155,7 @@ class TrajectoryExecution:
         trajectory: Any,
         cancelled: threading.Event,
         path: PathWatch | None = None,
-        admit: Admission = _always,
+        admit: Admission = _admit_always,
     ) -> None:
         """Executes a trajectory to its end.
 

@@ -98,14 +98,17 @@ class OctomapMonitor:
         sensor = self._pose_in_planning_frame(frame, stamp, positions)
         into_map = self._pose_in_planning_frame(self._frame, stamp, positions)
         ends, beyond = (points @ sensor.rotation.T + sensor.translation for points in (seen.ends, seen.beyond))
-        origin, clipped = _into(into_map, sensor.translation[None])[0], _into(into_map, beyond)
+        origin, clipped = (
+            _transformed_points(into_map, sensor.translation[None])[0],
+            _transformed_points(into_map, beyond),
+        )
         for _ in range(ATTEMPTS):
             scene = self._monitor.snapshot()
             bodies = bodies_in_scene(scene, positions)
             self._regions.keep_only(geometry for geometry, _ in bodies)
             known = make_filter(self._regions, bodies, sensor.translation)
             hidden = np.asarray(known.hides(ends, sensor.translation, shadow))
-            hits, masked = _into(into_map, ends[~hidden]), _into(into_map, ends[hidden])
+            hits, masked = _transformed_points(into_map, ends[~hidden]), _transformed_points(into_map, ends[hidden])
             voxels = self._map(scene, into_map).with_point_cloud(origin, hits, masked, clipped)
             if self._replace(scene, voxels, into_map):
                 return hidden
@@ -225,6 +228,6 @@ def _compile_loops() -> None:
     SelfFilter(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, origin)
 
 
-def _into(pose: Transform, points: Array) -> Array:
+def _transformed_points(pose: Transform, points: Array) -> Array:
     """Transforms points, shape (n, 3), into the frame with the given pose."""
     return np.asarray((points - pose.translation) @ pose.rotation)

@@ -15,14 +15,14 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 CENTRE, INTERIM = "center", "interim"
 
 
-def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_constraints") -> AuxiliaryPoint:
+def auxiliary_point(scene: PlanningScene, constraints: Any, source_name: str = "path_constraints") -> AuxiliaryPoint:
     """Returns the auxiliary point in the planning frame.
 
     Args:
         scene: Planning scene with the frame poses.
         constraints: moveit_msgs/Constraints named "center" or "interim", with one position constraint whose region
             has one pose; shapes and orientation are ignored.
-        where: Name of the message field in error messages.
+        source_name: Name of the message field in error messages.
 
     Raises:
         PlanningError: The name is unknown, the number of points is not 1, the point is not finite, or its frame or
@@ -36,15 +36,15 @@ def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_c
     if constraints.name not in (CENTRE, INTERIM) or len(constraints.position_constraints) != 1 or len(poses) != 1:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"{where}: name '{constraints.name}' with "
+            f"{source_name}: name '{constraints.name}' with "
             f"{len(constraints.position_constraints)} position constraints and {len(poses)} poses; "
             f"CIRC needs the name '{CENTRE}' or '{INTERIM}' and one position constraint whose region "
             "has one pose: the auxiliary point",
         )
     item = constraints.position_constraints[0]
     if item.link_name:
-        require_holding_link(scene, item.link_name, f"{where}: link")
+        require_holding_link(scene, item.link_name, f"{source_name}: link")
     point = np.array([poses[0].position.x, poses[0].position.y, poses[0].position.z], dtype=float)
     if not np.isfinite(point).all():
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{where}: the point {point.tolist()} is not finite")
+        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"{source_name}: the point {point.tolist()} is not finite")
     return AuxiliaryPoint(constraints.name, scene.frame_transform(item.header.frame_id).act(point))

@@ -35,7 +35,7 @@ class CartesianLimits:
         return self.velocity / self.rotation_velocity
 
 
-def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_limits") -> CartesianLimits:
+def read_cartesian_limits(entries: Mapping[str, Any], source_name: str = "cartesian_limits") -> CartesianLimits:
     """Reads the four limits.
 
     Raises:
@@ -54,7 +54,7 @@ def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_li
             got = "missing" if key not in entries else repr(value)
             faults.append(f"{key} is {got}; it must be a number {'below' if sign < 0 else 'above'} 0")
     if faults:
-        raise ModelError(f"{where}: {'; '.join(faults)}; see pilz_cartesian_limits.yaml of a config package")
+        raise ModelError(f"{source_name}: {'; '.join(faults)}; see pilz_cartesian_limits.yaml of a config package")
     return CartesianLimits(
         float(entries["max_trans_vel"]),
         float(entries["max_trans_acc"]),

@@ -93,7 +93,7 @@ PosePath = LinePath | ArcPath
 """A path of a link; `fraction` runs from 0 to 1."""
 
 
-def _invalid(reason: str) -> PlanningError:
+def _invalid_path_error(reason: str) -> PlanningError:
     return PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"CIRC: {reason}")
 
 
@@ -115,17 +115,17 @@ def arc_around_centre(start: Transform, end: Transform, centre: Array) -> ArcPat
     start_offset, end_offset = start.translation - centre, end.translation - centre
     start_radius, end_radius = float(np.linalg.norm(start_offset)), float(np.linalg.norm(end_offset))
     if min(start_radius, end_radius) < MIN_RADIUS:
-        raise _invalid(
+        raise _invalid_path_error(
             f"the centre is {min(start_radius, end_radius):.6f} m from start or goal; it must be at least "
             f"{MIN_RADIUS} m away"
         )
     if abs(start_radius - end_radius) > RADIUS_TOLERANCE:
-        raise _invalid(
+        raise _invalid_path_error(
             f"start is {start_radius:.4f} m from the centre and goal {end_radius:.4f} m; the distances may differ "
             f"by at most {RADIUS_TOLERANCE} m: move the centre"
         )
     if _sine(start_offset, end_offset) < MIN_SINE:
-        raise _invalid(
+        raise _invalid_path_error(
             "start, centre and goal lie on one line, so the plane of the circle is undefined; "
             "use an interim point for a half circle, or two arcs for a full circle"
         )
@@ -158,7 +158,7 @@ def arc_through_interim(start: Transform, end: Transform, interim: Array) -> Arc
     to_interim, to_end = interim - start.translation, end.translation - start.translation
     nearest = min(float(np.linalg.norm(item)) for item in (to_interim, to_end, to_end - to_interim))
     if nearest < MIN_RADIUS or _sine(to_interim, to_end) < MIN_SINE:
-        raise _invalid(
+        raise _invalid_path_error(
             "start, interim point and goal coincide or lie on one line, so they define no circle; use two arcs "
             "for a full circle"
         )
