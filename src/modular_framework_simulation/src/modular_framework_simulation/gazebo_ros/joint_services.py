@@ -86,7 +86,7 @@ class JointServices:
                 raise ValueError("got vel without fmax; a motor without maximum effort has no effect; give both")
         change = JointChange(_limit(config.loStop, "loStop"), _limit(config.hiStop, "hiStop"), settings)
         set_joint(self._world, joint, change)
-        return srv.SetJointPropertiesResponse(True, f"set the properties of joint '{joint.scoped}'")
+        return srv.SetJointPropertiesResponse(True, f"set the properties of joint '{joint.scoped_name}'")
 
     def _apply_effort(self, request: Any) -> Any:
         joint = self._joint(request.joint_name)
@@ -97,7 +97,7 @@ class JointServices:
             return srv.ApplyJointEffortResponse(True, "the duration is 0: no effort acts; use -1 for no end")
         interval = Interval.from_request(self._world.time_ns, request.start_time.to_nsec(), duration_ns)
         self._world.forces.add_effort(JointEffort(joint, request.effort, interval))
-        return srv.ApplyJointEffortResponse(True, f"the effort acts on '{joint.scoped}' {describe(interval)}")
+        return srv.ApplyJointEffortResponse(True, f"the effort acts on '{joint.scoped_name}' {describe(interval)}")
 
     def _clear_forces(self, request: Any) -> None:
         self._world.forces.clear_joint(self._joint(request.joint_name))
