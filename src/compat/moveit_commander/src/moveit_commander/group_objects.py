@@ -131,7 +131,7 @@ class GroupObjects(GroupMotion):
         """Returns a location with approach along -z of the planning frame and retreat along -x of the link."""
         if not isinstance(pose, Pose | PoseStamped):
             raise MoveItCommanderException(f"Parameter location must be a {PLACE_KINDS} object; got {type(pose)}")
-        location = PlaceLocation(place_pose=self._stamped(pose))
+        location = PlaceLocation(place_pose=self._stamped_pose(pose))
         approach, retreat = location.pre_place_approach, location.post_place_retreat
         approach.direction.header.frame_id = self.get_planning_frame()
         approach.direction.vector.z = -1.0
