@@ -312,8 +312,8 @@ def test_a_metric(tmp_path: Path) -> None:
     )
     recipe.insert(
         f"{metrics}/registry.py",
-        "    _registered(kinematics.solved_share,",
-        "    _registered(planning.planned_motions, _COUNT, _LOWER),\n",
+        "    _make_metric(kinematics.solved_share,",
+        "    _make_metric(planning.planned_motions, _COUNT, _LOWER),\n",
     )
     recipe.run(MEASURED)
     (episodes,) = (tmp_path / "tables").glob("*_episodes.csv")

@@ -35,7 +35,7 @@ class WritingPool:
         self.running: list[EpisodeSpec] = []
         self.most_bytes = 0
 
-    def free(self) -> list[str]:
+    def free_slots(self) -> list[str]:
         return ["a", "b"][len(self.running) :]
 
     def submit(self, _slot: str, spec: EpisodeSpec, folder: Path) -> None:
@@ -57,7 +57,7 @@ def opened(folder: Path) -> tuple[ResultDatabase, int, int]:
     experiment = read(PICK, folder)
     episodes = plan_episodes(experiment)
     database = open_database(folder / "results.db", create=True)
-    return database, database.add_experiment(experiment.described("d", {}), episodes), len(episodes)
+    return database, database.add_experiment(experiment.describe("d", {}), episodes), len(episodes)
 
 
 @pytest.mark.parametrize("limit", [4500, 10_000])

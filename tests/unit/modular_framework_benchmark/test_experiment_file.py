@@ -69,7 +69,7 @@ def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
 
 def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_path: Path) -> None:
     def poses(text: str) -> list[object]:
-        return [item.sampled((1, 0), 0) for item in read(text, tmp_path).combinations[0].objects]
+        return [item.sample((1, 0), 0) for item in read(text, tmp_path).combinations[0].objects]
 
     expected = poses(PICK)
     assert poses(yaml.safe_dump(yaml.safe_load(PICK))) == expected

@@ -37,8 +37,8 @@ START = {"table": state((0, 0, 0)), "cube": state((0, 0, STANDING_M)), "lid": st
 def last(predicate: Predicate, states: dict[str, Any], *, contacts: Any = (), held: Any = ()) -> bool:
     """Whether a predicate holds in a world that was at START before."""
     stage = stage_of(sample(0.0, START, [], []), sample(1.0, states, [list(pair) for pair in contacts], list(held)))
-    holds = bool(predicate.over(stage)[-1])
-    assert bool(predicate.unmet(stage)) is not holds
+    holds = bool(predicate.truth_over(stage)[-1])
+    assert bool(predicate.unmet_reasons(stage)) is not holds
     return holds
 
 
@@ -130,29 +130,31 @@ def test_a_condition_must_hold_for_its_duration_without_interruption() -> None:
         sample(time_s, START if not time_s else {}, [], each) for time_s, each in zip(times_s, held, strict=True)
     ]
     stage = stage_of(*samples)
-    assert HeldFor(object="cube").over(stage).tolist() == [True, True, False, True, True, True]
-    assert HeldFor(object="cube", duration=1.0).over(stage).tolist() == [False] * 5 + [True]
-    assert HeldFor(object="cube", duration=2.0).unmet(stage) == ("'cube' is in the gripper for less than 2 s",)
+    assert HeldFor(object="cube").truth_over(stage).tolist() == [True, True, False, True, True, True]
+    assert HeldFor(object="cube", duration=1.0).truth_over(stage).tolist() == [False] * 5 + [True]
+    assert HeldFor(object="cube", duration=2.0).unmet_reasons(stage) == ("'cube' is in the gripper for less than 2 s",)
 
 
 def test_combinations_hold_as_their_names_say() -> None:
     times = [(0.0, [], START), (1.0, ["cube"], {}), (2.0, ["cube"], {"cube": state((0, 0, 1))}), (3.0, [], {})]
     stage = stage_of(*(sample(time_s, states, [], held) for time_s, held, states in times))
     held, lifted = HeldFor(object="cube"), Lifted(object="cube", height=0.1)
-    assert All((held, lifted)).over(stage).tolist() == [False, False, True, False]
-    assert AnyOf((held, lifted)).over(stage).tolist() == [False, True, True, True]
-    assert Not(held).over(stage).tolist() == [True, False, False, True]
-    assert InOrder((held, lifted, Not(held))).over(stage).tolist() == [False, False, False, True]
-    assert not InOrder((lifted, Not(lifted))).over(stage).any()
-    assert InOrder((Not(held), lifted, held)).over(stage).tolist() == [False, False, True, True]
-    assert All((held, lifted)).unmet(stage) == ("'cube' is not in the gripper",)
-    assert Not(lifted).unmet(stage) == ("'cube' is more than 0.1 m higher than at the start, which must not hold",)
+    assert All((held, lifted)).truth_over(stage).tolist() == [False, False, True, False]
+    assert AnyOf((held, lifted)).truth_over(stage).tolist() == [False, True, True, True]
+    assert Not(held).truth_over(stage).tolist() == [True, False, False, True]
+    assert InOrder((held, lifted, Not(held))).truth_over(stage).tolist() == [False, False, False, True]
+    assert not InOrder((lifted, Not(lifted))).truth_over(stage).any()
+    assert InOrder((Not(held), lifted, held)).truth_over(stage).tolist() == [False, False, True, True]
+    assert All((held, lifted)).unmet_reasons(stage) == ("'cube' is not in the gripper",)
+    assert Not(lifted).unmet_reasons(stage) == (
+        "'cube' is more than 0.1 m higher than at the start, which must not hold",
+    )
 
 
 def test_a_model_that_is_not_in_the_world_satisfies_nothing() -> None:
     stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": None}))
-    assert not NotMoved(object="cube").over(stage)[-1] and not NoContact(object="cube").over(stage)[-1]
-    assert Upright(object="cup").unmet(stage) == ("there is no 'cup' in the world",)
+    assert not NotMoved(object="cube").truth_over(stage)[-1] and not NoContact(object="cube").truth_over(stage)[-1]
+    assert Upright(object="cup").unmet_reasons(stage) == ("there is no 'cup' in the world",)
 
 
 def test_the_task_begins_at_its_last_sample_and_what_was_before_does_not_count() -> None:
@@ -163,8 +165,8 @@ def test_the_task_begins_at_its_last_sample_and_what_was_before_does_not_count()
         started_s=1.01,
     )
     assert stage.times_s.tolist() == [1.0, 2.0]
-    assert Lifted(object="cube").over(stage).tolist() == [False, True]
-    assert not HeldFor(object="cube").over(stage).any()
+    assert Lifted(object="cube").truth_over(stage).tolist() == [False, True]
+    assert not HeldFor(object="cube").truth_over(stage).any()
 
 
 STEPS = (
@@ -178,16 +180,16 @@ def test_progress_counts_milestones_in_their_order_and_keeps_what_was_reached() 
     times = [(0.0, [], START), (1.0, ["cube"], {}), (2.0, ["cube"], {"cube": state((0, 0, 1))}), (3.0, [], START)]
     stage = stage_of(*(sample(time_s, states, [], held) for time_s, held, states in times))
     progress = progress_of(STEPS, stage)
-    assert progress.times_s == (1.0, 2.0) and progress.missed == "placed"
+    assert progress.times_s == (1.0, 2.0) and progress.first_missed == "placed"
     assert progress.fraction == pytest.approx(3 / 4)
     backwards = progress_of(STEPS[::-1], stage)
-    assert backwards.times_s == () and (backwards.fraction, backwards.missed) == (0.0, "placed")
+    assert backwards.times_s == () and (backwards.fraction, backwards.first_missed) == (0.0, "placed")
 
 
 def test_milestones_that_are_reached_at_the_same_moment_both_count() -> None:
     stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": state((0.2, 0, 1))}, None, ["cube"]))
     progress = progress_of(STEPS, stage)
-    assert progress.times_s == (1.0, 1.0, 1.0) and (progress.fraction, progress.missed) == (1.0, "")
+    assert progress.times_s == (1.0, 1.0, 1.0) and (progress.fraction, progress.first_missed) == (1.0, "")
 
 
 def test_an_operator_answers_the_same_predicates() -> None:
@@ -208,9 +210,9 @@ def test_an_operator_answers_the_same_predicates() -> None:
         stage.look(now_s, [step.predicate for step in STEPS])
     assert len(asked) == 9
     progress = progress_of(STEPS, stage)
-    assert progress.times_s == (1.0, 2.0) and progress.missed == "placed"
-    assert HeldFor(object="cube", duration=1.0).over(stage).tolist() == [False, False, False]  # was not asked
-    unmet = InRegion(object="cube", region=GOAL).unmet(stage)
+    assert progress.times_s == (1.0, 2.0) and progress.first_missed == "placed"
+    assert HeldFor(object="cube", duration=1.0).truth_over(stage).tolist() == [False, False, False]  # was not asked
+    unmet = InRegion(object="cube", region=GOAL).unmet_reasons(stage)
     assert unmet == ("the operator denies that 'cube' is in the region 'goal'",)
 
 
@@ -218,7 +220,7 @@ def test_the_short_form_of_a_pick_is_made_of_the_same_predicates() -> None:
     pick = SuccessCriteria(lifted=0.2).predicate("cube")
     assert pick == All((Lifted(object="cube", height=0.2), HeldFor(object="cube")))
     stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": state((0, 0, STANDING_M + 0.1))}))
-    assert pick.unmet(stage) == (
+    assert pick.unmet_reasons(stage) == (
         "'cube' is 0.100 m higher (wanted: more than 0.2 m)",
         "'cube' is not in the gripper",
     )
@@ -228,4 +230,4 @@ def test_the_short_form_of_a_pick_is_made_of_the_same_predicates() -> None:
 
 def test_a_stage_without_moments_has_reached_nothing() -> None:
     empty = OperatorStage(lambda _: True)
-    assert Upright(object="cube").unmet(empty) and isinstance(stage_of(sample(0.0, START)), SimulatedStage)
+    assert Upright(object="cube").unmet_reasons(empty) and isinstance(stage_of(sample(0.0, START)), SimulatedStage)

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from modular_framework_benchmark.episodes.method_node import COMMAND, IN_ITS_FOLDER
+from modular_framework_benchmark.episodes.method_node import COMMAND, IN_ITS_FOLDER_OPTION
 from modular_framework_benchmark.episodes.process_times import processor_time_s
 from modular_framework_core.launching.launch_session import kill_processes_with, processes_with
 from modular_framework_testing.ros_session import until
@@ -141,5 +141,5 @@ def test_a_node_can_run_in_its_folder(tmp_path: Path) -> None:
     program = tmp_path / "node"
     program.write_text("#!/bin/sh\npwd\n")
     program.chmod(0o755)
-    found = subprocess.run([*COMMAND, IN_ITS_FOLDER, str(program)], capture_output=True, text=True, check=True)
+    found = subprocess.run([*COMMAND, IN_ITS_FOLDER_OPTION, str(program)], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == str(tmp_path)

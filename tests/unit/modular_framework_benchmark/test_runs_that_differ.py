@@ -16,7 +16,7 @@ from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
-from modular_framework_benchmark.episodes.snapshot import RUN_MARK, MachineLoad, reference_s
+from modular_framework_benchmark.episodes.snapshot import RUN_ID_VARIABLE, MachineLoad, reference_s
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.experiment import Factor
@@ -224,10 +224,10 @@ def test_a_quiet_machine_gives_no_warning_and_the_report_shows_its_load(tmp_path
 
 def test_the_load_counts_other_processes_and_not_those_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     def share_of(mark: str) -> float:
-        monkeypatch.setenv(RUN_MARK, mark)
+        monkeypatch.setenv(RUN_ID_VARIABLE, mark)
         command = [sys.executable, "-c", "while True: pass"]
         with subprocess.Popen(command) as busy:
-            monkeypatch.setenv(RUN_MARK, "mine/worker/")
+            monkeypatch.setenv(RUN_ID_VARIABLE, "mine/worker/")
             before, spent = MachineLoad.now(), 0.0
             own = before.others_s.get(busy.pid)
             end = time.monotonic() + 30.0

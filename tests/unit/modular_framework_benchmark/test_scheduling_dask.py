@@ -39,7 +39,7 @@ def test_the_episode_of_a_lost_worker_runs_again_and_each_result_is_stored_once(
     episodes = plan_episodes(experiment)
     mark = f"dask{os.getpid()}"
     with open_database(tmp_path / "results.db", create=True) as database:
-        number = database.add_experiment(experiment.described(digest_of(experiment, episodes), {}), episodes)
+        number = database.add_experiment(experiment.describe(digest_of(experiment, episodes), {}), episodes)
         run = ExperimentRun(database, number, tmp_path / "episodes")
         end = run.run(
             lambda: DaskPool(cluster.scheduler_address, LosingRunner, mark, tmp_path / "logs"),

@@ -42,7 +42,7 @@ class Bench:
         self.folder = folder
         self.database: ResultDatabase = open_database(folder / "results.db", create=True)
         digest = digest_of(experiment, self.episodes)
-        self.number = self.database.add_experiment(experiment.described(digest, {}), self.episodes)
+        self.number = self.database.add_experiment(experiment.describe(digest, {}), self.episodes)
         self.mark = f"test{os.getpid()}"
 
     def run(self, make_runner: RunnerFactory, workers: int = 2, rule: object = None) -> RunEnd:

@@ -78,7 +78,7 @@ def test_nothing_is_lost_and_nothing_is_stored_twice(cluster: distributed.LocalC
         while runs < MOST_RUNS:
             runs += 1
             with open_database(network.url, create=True) as database:
-                number = database.add_experiment(experiment.described(digest_of(experiment, episodes), {}), episodes)
+                number = database.add_experiment(experiment.describe(digest_of(experiment, episodes), {}), episodes)
                 run = ExperimentRun(database, number, tmp_path / "episodes")
                 try:
                     run.run(

@@ -54,7 +54,7 @@ def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
 def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
     spec = EpisodeSpec(0, {}, 0, 1, TaskSettings(metrics=("success",)))
     end = EpisodeEnd(spec, tmp_path, time.time(), time.monotonic(), MachineLoad.now())
-    return make_record(end.ended(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
+    return make_record(end.with_status(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
 
 
 def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import open_source
 from modular_framework_benchmark.reports.run_record import content_differences, differences_of
 
-REGRESSED = 1
+EXIT_REGRESSED = 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,4 +61,4 @@ def _compare(arguments: argparse.Namespace) -> int:
                 arguments.into, regression_page(regression, before.database.label, after.database.label).encode()
             )
             print(f"compare: wrote {arguments.into}", file=sys.stderr)
-    return REGRESSED if arguments.fail_on_regression and regression.count(Change.WORSE) else 0
+    return EXIT_REGRESSED if arguments.fail_on_regression and regression.count(Change.WORSE) else 0

@@ -86,7 +86,7 @@ class ExperimentSession:
 
         print(f"{self._name}: {run.pending} of {self._stored.planned} episodes to run; results in {self._shown}")
         sys.stdout.flush()
-        with _Signals():
+        with _InterruptHandler():
             try:
                 end = run.run(make_pool, progress)
             except KeyboardInterrupt:
@@ -128,7 +128,7 @@ class ExperimentSession:
         return 0
 
 
-class _Signals:
+class _InterruptHandler:
     """Makes SIGTERM and SIGHUP end a run like Ctrl-C, unless they are ignored, as with nohup."""
 
     def __enter__(self) -> None:

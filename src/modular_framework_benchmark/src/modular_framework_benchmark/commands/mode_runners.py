@@ -27,9 +27,9 @@ def known_metrics() -> dict[str, Mapping[str, Metric]]:
 
     return {
         mode.name: {
-            name: known.metric if mode is TASK else dataclasses.replace(known.metric, source=Source.MEASURED)
-            for name, known in METRICS.items()
-            if name == "success" or known.metric.component in mode.components
+            name: metric.metric if mode is TASK else dataclasses.replace(metric.metric, source=Source.MEASURED)
+            for name, metric in METRICS.items()
+            if name == "success" or metric.metric.component in mode.components
         }
         for mode in MODES.values()
     }
@@ -37,7 +37,7 @@ def known_metrics() -> dict[str, Mapping[str, Metric]]:
 
 def setting_checks() -> dict[str, SettingsCheck]:
     """Returns the checks of the settings, keyed by mode."""
-    return {mode.name: partial(_loaded(mode.check), _loaded(mode.runner)()) for mode in MODES.values()}
+    return {mode.name: partial(_load_object(mode.check), _load_object(mode.runner)()) for mode in MODES.values()}
 
 
 def runner_factory(mode: str, own: str = "") -> RunnerFactory:
@@ -52,7 +52,7 @@ def runner_factory(mode: str, own: str = "") -> RunnerFactory:
     """
     reference = own or MODES[mode].runner
     try:
-        factory = _loaded(reference)
+        factory = _load_object(reference)
     except (ImportError, AttributeError, ValueError) as error:
         raise RunnerError(
             f"the runner {reference} of mode {mode} cannot be imported ({error}); build and source the workspace, or "
@@ -63,7 +63,7 @@ def runner_factory(mode: str, own: str = "") -> RunnerFactory:
     return factory  # type: ignore[no-any-return]
 
 
-def _loaded(reference: str) -> Any:
+def _load_object(reference: str) -> Any:
     """Returns the object that MODULE:NAME names."""
     module, _, name = reference.partition(":")
     return getattr(importlib.import_module(module), name)

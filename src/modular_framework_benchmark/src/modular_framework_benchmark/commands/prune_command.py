@@ -68,7 +68,7 @@ def _prune(arguments: argparse.Namespace) -> int:
     chosen = episodes[(episodes["begun"] < time.time() - DAY_S * arguments.older_than) & (episodes["folder"] != "")]
     if arguments.keep_failures:
         chosen = chosen[chosen["status"] == EpisodeStatus.SUCCEEDED.value]
-    paths = _paths(chosen, root, arguments.files)
+    paths = _paths_to_delete(chosen, root, arguments.files)
     size = sum(tree_size(path) if path.is_dir() else path.lstat().st_size for path in paths)
     for path in paths if arguments.delete else ():
         try:
@@ -80,7 +80,7 @@ def _prune(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _paths(episodes: pd.DataFrame, root: Path, kinds: Sequence[str]) -> list[Path]:
+def _paths_to_delete(episodes: pd.DataFrame, root: Path, kinds: Sequence[str]) -> list[Path]:
     """Returns the paths to delete, restricted to the folder of the database."""
     paths = []
     for text in episodes["folder"]:

@@ -13,12 +13,12 @@ from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.html_page import report_page
 from modular_framework_benchmark.reports.image_export import FORMATS, figure_image, find_browser, find_figure
 from modular_framework_benchmark.reports.paper_tables import latex_table, markdown_table
-from modular_framework_benchmark.reports.report_content import ReportContent, gather
+from modular_framework_benchmark.reports.report_content import ReportContent, gather_content
 from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import OpenedExperiment, open_source
 from modular_framework_benchmark.reports.tables import answer_text, overview_table
 
-TABLES = {"markdown": markdown_table, "latex": latex_table}
+TABLE_WRITERS = {"markdown": markdown_table, "latex": latex_table}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,7 +37,7 @@ def write_page(experiment: OpenedExperiment, page: Path) -> str:
         ReportError: The file is not writable.
         ResultsError: The database is unreadable.
     """
-    content = gather(experiment.results, experiment.source(page.absolute().parent))
+    content = gather_content(experiment.results, experiment.source(page.absolute().parent))
     write_file(page, report_page(content, experiment.database.label).encode())
     return answer_text(content)
 
@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="compute confidence intervals for mean differences of bounded metrics",
     )
-    parser.add_argument("--table", choices=sorted(TABLES), help="print the table of methods for a paper")
+    parser.add_argument("--table", choices=sorted(TABLE_WRITERS), help="print the table of methods for a paper")
     return parser
 
 
@@ -72,7 +72,9 @@ def _report(arguments: argparse.Namespace) -> int:
     with open_source(arguments.database, arguments.experiment) as experiment:
         name = experiment.results.description.name
         output = arguments.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
-        content = gather(experiment.results, experiment.source(output.absolute().parent), arguments.mean_intervals)
+        content = gather_content(
+            experiment.results, experiment.source(output.absolute().parent), arguments.mean_intervals
+        )
         if arguments.table:
             return _write_table(content, arguments)
         if figure == "list":
@@ -100,7 +102,7 @@ def _figure_and_format(text: str) -> tuple[str, str]:
 
 
 def _write_table(content: ReportContent, arguments: argparse.Namespace) -> int:
-    text = TABLES[arguments.table](overview_table(content))
+    text = TABLE_WRITERS[arguments.table](overview_table(content))
     if arguments.into is None:
         print(text, end="")
     else:

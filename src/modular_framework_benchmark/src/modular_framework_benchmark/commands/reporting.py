@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.errors import ResultsError
 
-NOT_REPORTED = 2
+EXIT_NOT_REPORTED = 2
 
 
 def database_parser(prog: str, description: str) -> argparse.ArgumentParser:
@@ -33,9 +33,9 @@ def run_reporting(
         arguments: Command-line arguments; None for the arguments of the process.
         execute: Function that executes the command and returns the exit code.
     """
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     try:
-        return execute(given)
+        return execute(options)
     except (ReportError, ResultsError) as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
-        return NOT_REPORTED
+        return EXIT_NOT_REPORTED

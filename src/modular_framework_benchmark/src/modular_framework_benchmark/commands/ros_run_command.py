@@ -13,7 +13,7 @@ import rospkg
 
 from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
 from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics, setting_checks
-from modular_framework_benchmark.commands.stopping_rules import settings_of
+from modular_framework_benchmark.commands.stopping_rules import run_settings_of
 from modular_framework_benchmark.experiments.design import design_text, digest_of, plan_episodes
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
@@ -51,7 +51,7 @@ def run_experiment(arguments: Sequence[str]) -> int:
         "--robot", metavar="PACKAGE", help="use the start_framework.launch of this package in the mode task"
     )
     _add_run_options(parser)
-    return _guarded(_run, parser.parse_args(arguments))
+    return _run_guarded_command(_run, parser.parse_args(arguments))
 
 
 def resume(arguments: Sequence[str]) -> int:
@@ -60,7 +60,7 @@ def resume(arguments: Sequence[str]) -> int:
     parser.add_argument("database", help="SQLite file or SQLAlchemy URL with its results")
     parser.add_argument("--experiment", help="name of the experiment; default: the only unfinished experiment")
     _add_run_options(parser)
-    return _guarded(_resume, parser.parse_args(arguments))
+    return _run_guarded_command(_resume, parser.parse_args(arguments))
 
 
 def _add_run_options(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +74,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+def _run_guarded_command(command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
     """Runs a command; converts errors to messages and exit codes."""
     try:
         if options.workers is not None and options.workers < 1:
@@ -127,32 +127,32 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
     """
     with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
         ran_with = run_digests(episodes)
-        number = database.add_experiment(experiment.described(digest_of(experiment, episodes), ran_with), episodes)
-        return _session(database, number, lock, options, experiment).run()
+        number = database.add_experiment(experiment.describe(digest_of(experiment, episodes), ran_with), episodes)
+        return _make_session(database, number, lock, options, experiment).run()
 
 
 def _resume(options: argparse.Namespace) -> int:
     with RunLock(options.database) as lock, open_database(options.database) as database:
-        number = _unfinished(database, options.experiment, options.database)
+        number = _find_unfinished_experiment(database, options.experiment, options.database)
         database.check_resumed(number, run_digests(database.pending(number)))
-        return _session(database, number, lock, _session_options(options, options.database), None).run()
+        return _make_session(database, number, lock, _session_options(options, options.database), None).run()
 
 
 def _session_options(options: argparse.Namespace, target: str) -> SessionOptions:
     return SessionOptions(target, options.workers, options.scheduler, options.runner, options.disk_limit)
 
 
-def _session(
+def _make_session(
     database: ResultDatabase, number: int, lock: RunLock, options: SessionOptions, experiment: Experiment | None
 ) -> ExperimentSession:
     if lock.ended_processes:
         print(f"ended {lock.ended_processes} processes of an earlier run", file=sys.stderr)
     (description,) = (stored.description for stored in database.experiments() if stored.id == number)
-    settings = settings_of(experiment, description)
+    settings = run_settings_of(experiment, description)
     return ExperimentSession(database, number, lock.run, options, settings)
 
 
-def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
+def _find_unfinished_experiment(database: ResultDatabase, name: str | None, target: str) -> int:
     """Returns the identifier of the experiment to continue."""
     if name is not None:
         return database.find(name)
@@ -170,13 +170,13 @@ def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
     )
 
 
-def experiment_path(given: Path) -> Path:
+def experiment_path(path_argument: Path) -> Path:
     """Returns the path of an experiment file: as given, or in the API package for a bare name."""
-    if given.exists() or given.name != str(given):
-        return given
+    if path_argument.exists() or path_argument.name != str(path_argument):
+        return path_argument
     try:
         folder = Path(rospkg.RosPack().get_path(API_PACKAGE)) / "experiments"
     except rospkg.ResourceNotFound:
-        return given
-    shipped = [folder / given.name, folder / f"{given.name}.yaml"]
-    return next((path for path in shipped if path.is_file()), given)
+        return path_argument
+    shipped = [folder / path_argument.name, folder / f"{path_argument.name}.yaml"]
+    return next((path for path in shipped if path.is_file()), path_argument)

@@ -22,7 +22,7 @@ class RunSettings:
     stopping: Stopping
 
 
-def settings_of(experiment: Experiment | None, description: ExperimentDescription) -> RunSettings:
+def run_settings_of(experiment: Experiment | None, description: ExperimentDescription) -> RunSettings:
     """Returns the settings of an experiment, or of its text in the database."""
     if experiment is not None:
         return RunSettings(experiment.workers, experiment.stopping)

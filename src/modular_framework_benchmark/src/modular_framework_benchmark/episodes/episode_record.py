@@ -33,7 +33,7 @@ from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLAS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
 TASK_RECORDS = "task_records"
-PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
+EPISODE_PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, with the moment that ends each."""
 SNAPSHOT_KEYS = ("shake_fault", "video_fault", "recording_fault", "world_digest")
 
@@ -72,7 +72,7 @@ class EpisodeEnd:
         """Returns the end of an episode that could not run."""
         return replace(self, status=EpisodeStatus.BROKEN, cause=cause)
 
-    def ended(self, status: EpisodeStatus, cause: str, answer: Mapping[str, Any]) -> EpisodeEnd:
+    def with_status(self, status: EpisodeStatus, cause: str, answer: Mapping[str, Any]) -> EpisodeEnd:
         """Returns the end of an episode that ran.
 
         Args:
@@ -86,7 +86,7 @@ class EpisodeEnd:
         """Returns this end with the name of the object in the success criteria."""
         return replace(self, target=target)
 
-    def first_of_stack(self, is_cold: bool) -> EpisodeEnd:
+    def with_cold_start_mark(self, is_cold: bool) -> EpisodeEnd:
         """Returns this end with the mark of the first episode of a stack."""
         return replace(self, is_cold=is_cold)
 
@@ -94,7 +94,7 @@ class EpisodeEnd:
         """Returns this end with the reason for a missing video; "" if there is a video."""
         return replace(self, answer={**self.answer, "video_fault": fault})
 
-    def stopped(self, stop_s: float) -> EpisodeEnd:
+    def with_stop_time(self, stop_s: float) -> EpisodeEnd:
         """Returns this end with the duration of the shutdown [s]."""
         return replace(self, stop_s=stop_s)
 
@@ -104,7 +104,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     wall_s = time.monotonic() - end.begun_monotonic
     software = UsedSoftware.from_parts(end.answer.get("ran", {}))
     if software.invalid_cause:
-        end = end.ended(EpisodeStatus.INVALID, software.invalid_cause, end.answer)
+        end = end.with_status(EpisodeStatus.INVALID, software.invalid_cause, end.answer)
     recording = read_recording(end.folder)
     states = _state_spans(end)
     answer = end.answer
@@ -124,7 +124,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         method_processor_s=answer.get("method_processor_s"),
         reports=reports_of(recording),
         joints=joints,
-        hand=_hand(end.folder, joints) if answer.get("held") else None,
+        hand=_read_hand_track(end.folder, joints) if answer.get("held") else None,
         tracking=read_tracking(end.folder),
         objects=objects_of(recording),
         target=end.target,
@@ -177,13 +177,13 @@ def _milestone_spans(progress: Progress | None) -> list[Span]:
             progress.started_s,
             time_s,
             failed=time_s is None,
-            reason="missed first" if milestone.name == progress.missed else "",
+            reason="missed first" if milestone.name == progress.first_missed else "",
         )
         for milestone, time_s in zip(progress.milestones, times_s, strict=True)
     ]
 
 
-def _hand(folder: Path, joints: JointSamples | None) -> ObjectTrack | None:
+def _read_hand_track(folder: Path, joints: JointSamples | None) -> ObjectTrack | None:
     urdf, srdf = read_descriptions(folder)
     link = hand_link(srdf) if srdf else ""
     return hand_track(urdf, link, joints) if urdf and link and joints is not None else None
@@ -208,7 +208,7 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
 def _part_spans(end: EpisodeEnd, wall_s: float) -> list[Span]:
     """Returns the spans of the episode's parts: start of the stack, task, check and recording, stop."""
     moments, spans, start_s = end.answer.get("parts", {}), [], 0.0
-    for name, moment in PARTS:
+    for name, moment in EPISODE_PARTS:
         if moment in moments:
             spans.append(Span("episode", name, start_s, float(moments[moment])))
             start_s = float(moments[moment])

@@ -104,8 +104,8 @@ class RecordedScene:
         """Sets joints and objects to their states at a time [s since the start of the recording]."""
         row = _latest(self._joints.times_s, time_s)
         positions = dict(zip(self._joints.joints, self._joints.positions[row].tolist(), strict=True))
-        known = self._robot.body.joint_indices
-        self._robot.body.set_joints({name: value for name, value in positions.items() if name in known})
+        joint_indices = self._robot.body.joint_indices
+        self._robot.body.set_joints({name: value for name, value in positions.items() if name in joint_indices})
         present = set(self._world.names())
         for name, track in self._tracks.items():
             if name in present and len(track.times_s):
@@ -182,12 +182,12 @@ def make_video_apart(folder: Path) -> str:
     """
     command = [sys.executable, "-m", __name__, str(folder)]
     try:
-        made = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+        process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
         return f"the video was not finished within {TIMEOUT_S:g} s"
-    if made.returncode == 0:
+    if process.returncode == 0:
         return ""
-    return (made.stderr.strip().splitlines() or [f"exit code {made.returncode}"])[-1]
+    return (process.stderr.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
 
 
 def main(arguments: list[str]) -> int:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 COMMAND = (sys.executable, "-I", str(Path(__file__).resolve()))
 """Program and first arguments; independent of the Python environment of the node."""
-IN_ITS_FOLDER = "--in-its-folder"
+IN_ITS_FOLDER_OPTION = "--in-its-folder"
 """Option that runs the node in the folder of its executable."""
 PR_SET_CHILD_SUBREAPER = 36
 """Operation of prctl, see linux/prctl.h."""
@@ -72,7 +72,7 @@ def main(arguments: list[str]) -> int:
     become_subreaper()
     for number in (signal.SIGINT, signal.SIGTERM):  # roslaunch sends both to the process group, thus also to the node
         signal.signal(number, lambda *_: None)
-    if arguments[0] == IN_ITS_FOLDER:
+    if arguments[0] == IN_ITS_FOLDER_OPTION:
         arguments = arguments[1:]
         os.chdir(Path(arguments[0]).parent)
     exit_code = run(arguments)

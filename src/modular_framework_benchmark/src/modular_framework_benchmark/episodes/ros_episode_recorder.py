@@ -162,11 +162,11 @@ class EpisodeRecorder:
             return
         with contextlib.closing(BagRecording(folder)) as bag:
 
-            def subscribed() -> bool:
+            def is_subscribed() -> bool:
                 bag.check()
                 return _is_subscribed("/joint_states", f"/{BAG_NODE}")
 
-            self._wait(subscribed)
+            self._wait(is_subscribed)
             yield
             bag.check()
 

@@ -270,12 +270,12 @@ def _belongs(path: Any, report: dict[str, Any]) -> bool:
     trajectory = path.trajectory[-1].joint_trajectory
     ends = ((trajectory.points[0], report.get("start")), (trajectory.points[-1], report.get("goal")))
     return all(
-        known
+        known_positions
         and all(
-            abs(known.get(joint, value) - value) < 1e-4
+            abs(known_positions.get(joint, value) - value) < 1e-4
             for joint, value in zip(trajectory.joint_names, point.positions, strict=True)
         )
-        for point, known in ends
+        for point, known_positions in ends
     )
 
 

@@ -38,9 +38,9 @@ FILE_PARAMETERS = {
 }
 """Parameters of nodes that name files, keyed by kind of file."""
 NODE_TIMEOUT_S = 5.0
-KINEMATICS = "/robot_description_kinematics"
+KINEMATICS_PARAMETER = "/robot_description_kinematics"
 WORLD, MODEL_PATH = "/gazebo/world_file", "/gazebo_model_path"
-DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
+DESCRIPTION_PARAMETERS = ("/robot_description", "/robot_description_semantic")
 
 
 def running_stack(
@@ -66,7 +66,7 @@ def running_stack(
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
         digests=_digests(parameters, controllers, models),
-        substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS))),
+        substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS_PARAMETER))),
     )
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
@@ -75,7 +75,7 @@ def running_stack(
 
 def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: Iterable[str]) -> dict[str, str]:
     """Returns the SHA-256 of what determines the episodes of a stack, keyed by description."""
-    urdf, srdf = (str(_value(parameters, name)) for name in DESCRIPTIONS)
+    urdf, srdf = (str(_value(parameters, name)) for name in DESCRIPTION_PARAMETERS)
     named = {what: Path(str(_value(parameters, name))) for what, name in FILE_PARAMETERS.items()}
     named |= {f"machine {file.name}": file for file in machine_files(named["task"])}
     digests = {what: file_digest(path) for what, path in named.items() if path.is_file()}

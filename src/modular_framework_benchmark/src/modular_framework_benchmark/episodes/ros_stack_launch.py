@@ -47,10 +47,10 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         raise SettingsError(f"setting 'launch' is {file!r}; allowed: PACKAGE/FILE.launch; correct it")
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, name))])[0]
-        known = known_arguments(path)
-        arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
+        arguments_of_file = known_arguments(path)
+        arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in arguments_of_file}
         arguments |= {**settings.arguments, **({"task_constructor_script": settings.task} if settings.task else {})}
-        arguments |= {name: value for name, value in FIXED_ARGUMENTS.items() if name in known}
+        arguments |= {name: value for name, value in FIXED_ARGUMENTS.items() if name in arguments_of_file}
         argument_texts = [f"{name}:={value}" for name, value in arguments.items()]
         check_arguments(path, argument_texts, file_faults)
         values = argument_values(path, argument_texts)

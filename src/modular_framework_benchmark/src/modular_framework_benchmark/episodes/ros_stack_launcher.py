@@ -22,7 +22,7 @@ from modular_framework_benchmark.episodes import method_node
 from modular_framework_core.launching.launch_runner import LaunchSpec, run_launch
 
 
-def wrap(node: roslaunch.core.Node) -> None:
+def start_by_method_node(node: roslaunch.core.Node) -> None:
     """Makes `method_node` start a node.
 
     Args:
@@ -30,7 +30,7 @@ def wrap(node: roslaunch.core.Node) -> None:
     """
     command = shlex.join(method_node.COMMAND)
     if node.cwd == "node":  # roslaunch takes the folder of the first program
-        command += f" {method_node.IN_ITS_FOLDER}"
+        command += f" {method_node.IN_ITS_FOLDER_OPTION}"
     node.launch_prefix = f"{command} {node.launch_prefix or ''}"
 
 
@@ -39,13 +39,13 @@ def main(arguments: list[str]) -> int:
     package, launch_file, parameters, method_nodes, *launch_arguments = arguments
     names = method_nodes.split(",")
 
-    def prepare(node: roslaunch.core.Node) -> None:
+    def prepare_node(node: roslaunch.core.Node) -> None:
         if node.namespace + node.name in names:
-            wrap(node)
+            start_by_method_node(node)
 
     spec = LaunchSpec(package, launch_file, launch_arguments, later_files=[Path(parameters)])
     # The task waits for its start and does not end, so the end of its node counts as a death.
-    return run_launch(spec, task_name="", leaves_nodes=True, prepare=prepare)
+    return run_launch(spec, task_name="", leaves_nodes=True, prepare=prepare_node)
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ class TaskEpisodeRunner:
             self.close()
             return make_record(end.broken(str(error)))
         stack, is_cold = self._stack_for(launch)
-        end = end.first_of_stack(is_cold).with_target(target)
+        end = end.with_cold_start_mark(is_cold).with_target(target)
         try:
             end = self._run_on(stack, settings, launch, end)
             if is_cold and _can_run_again(stack, settings, launch, end):
@@ -71,7 +71,7 @@ class TaskEpisodeRunner:
             stack.write_log(folder / "log.txt")
             if not (settings.warm and _can_restart(stack, launch, end)):
                 self.close()
-        end = end.stopped(time.monotonic() - stop)
+        end = end.with_stop_time(time.monotonic() - stop)
         if settings.record.video and "zero" in end.answer:
             end = end.with_video_fault(make_video_apart(folder))
         return make_record(end)
@@ -124,13 +124,13 @@ class TaskEpisodeRunner:
             cause = f"no end within {settings.time_limit:g} s; {stack.last_output()}"
             # The method is not called before the world is ready.
             status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
-            return end.ended(status, cause, answer)
+            return end.with_status(status, cause, answer)
         if "fault" in answer:
             return end.broken(stack.root_cause(str(answer["fault"])))
         if answer.get("foul"):
-            return end.ended(EpisodeStatus.INVALID, str(answer["foul"]), answer)
+            return end.with_status(EpisodeStatus.INVALID, str(answer["foul"]), answer)
         cause = _failure(settings, end.target, answer, read_stage(end.folder, answer))
-        return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
+        return end.with_status(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
 
 
 def _can_restart(stack: Stack, launch: StackLaunch, end: EpisodeEnd) -> bool:
@@ -171,5 +171,5 @@ def _failure(settings: TaskSettings, target: str, answer: Mapping[str, Any], sta
         return ""
     if stage is None:
         return "the simulation recorded no states of the world, so that success cannot be judged"
-    unmet = settings.success.predicate(target).unmet(stage)
+    unmet = settings.success.predicate(target).unmet_reasons(stage)
     return f"the task claims success, but {settings.success.hold_s:g} s later {' and '.join(unmet)}" if unmet else ""

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 import rospkg
 
-PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
+RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
 """Packages whose versions affect results."""
 
 ROS_PACKAGES = ("actionlib", "genpy", "robot_state_publisher", "roscpp", "rosgraph", "roslaunch", "rospy", "tf2_ros")
 """Packages of ROS whose versions affect results."""
-RUN_MARK = "MODULAR_FRAMEWORK_RUN"
+RUN_ID_VARIABLE = "MODULAR_FRAMEWORK_RUN"
 """Environment variable of every process of a run: RUN/WORKER."""
 
 
@@ -31,7 +31,7 @@ RUN_MARK = "MODULAR_FRAMEWORK_RUN"
 def versions() -> dict[str, Any]:
     """Returns the git revision of this software and the versions of its environment, constant within a process."""
     package_versions = {}
-    for name in PACKAGES:
+    for name in RECORDED_PACKAGES:
         try:
             package_versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
@@ -64,12 +64,12 @@ def _environment_digest() -> str:
 def _git(*arguments: str) -> str:
     """Returns the output of git for the source tree; "" outside a repository, such as in an install space."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             ["git", "-C", str(Path(__file__).resolve().parent), *arguments], capture_output=True, text=True, timeout=20
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+    return process.stdout.strip() if process.returncode == 0 else ""
 
 
 @functools.cache
@@ -143,7 +143,7 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 def _others_s() -> dict[int, float]:
     excluded, times_s = {os.getpid(), os.getppid()}, {}
-    run = f"{RUN_MARK}={os.environ.get(RUN_MARK, '').partition('/')[0]}".encode()
+    run = f"{RUN_ID_VARIABLE}={os.environ.get(RUN_ID_VARIABLE, '').partition('/')[0]}".encode()
     for folder in Path("/proc").iterdir():
         try:
             if not folder.name.isdigit() or int(folder.name) in excluded or _is_of_run(folder, run):

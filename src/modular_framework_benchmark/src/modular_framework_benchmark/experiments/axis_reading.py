@@ -15,7 +15,7 @@ from modular_framework_ros.allowed_names import listing
 
 AXIS_KEYS = ("unit", "levels", "range", "steps", "nominal")
 DEFAULT_STEPS, MAX_LEVELS = 5, 1024
-DIGITS = 4
+LEVEL_DIGITS = 4
 """Significant digits of computed levels, so that the label states the exact value."""
 
 
@@ -43,7 +43,7 @@ class ReadAxis:
         return self.axis.name
 
     @property
-    def described(self) -> PerturbedAxis:
+    def perturbed_axis(self) -> PerturbedAxis:
         """Returns the axis for reports."""
         return PerturbedAxis(self.name, self.unit, self.nominal)
 
@@ -68,19 +68,19 @@ def read_axis(axis: PerturbationAxis, node: Node, design: str, reading: ValueRea
     mapping = reading.mapping(node, axis.name, f"{{unit: {next(iter(axis.units))}, levels: [{axis.nominal:g}, ...]}}")
     if mapping is None:
         return None
-    known = corrected_keys(mapping, AXIS_KEYS, f"the key of {axis.name}", reading.faults).entries
-    if "unit" not in known:
+    entries = corrected_keys(mapping, AXIS_KEYS, f"the key of {axis.name}", reading.faults).entries
+    if "unit" not in entries:
         text = (
             f"the axis {axis.name} has no unit; {listing(axis.units)}; add it, such as unit: {next(iter(axis.units))}"
         )
         reading.faults.add(node.location, text)
         return None
-    unit = reading.choice(known["unit"], f"the unit of {axis.name}", axis.units)
+    unit = reading.choice(entries["unit"], f"the unit of {axis.name}", axis.units)
     if unit is None:
         return None
     values = _AxisValues(reading, axis, unit)
-    nominal = values.number(known["nominal"], "nominal") if "nominal" in known else axis.nominal / axis.units[unit]
-    levels = values.levels(node, known, design)
+    nominal = values.number(entries["nominal"], "nominal") if "nominal" in entries else axis.nominal / axis.units[unit]
+    levels = values.levels(node, entries, design)
     if levels and set(levels) == {nominal}:
         text = f"the axis {axis.name} has only its nominal level {nominal:g}; add a level"
         reading.faults.add(node.location, text)
@@ -99,47 +99,47 @@ class _AxisValues:
         """Returns a number within the allowed range of the axis; NaN after a fault."""
         scale = self.axis.units[self.unit]
         low, high = (float(f"{end / scale:.12g}") for end in (self.axis.low, self.axis.high))
-        found = self.reading.number(node, f"{what} of {self.axis.name} [{self.unit}]", low, high)
-        return math.nan if found is None else found
+        value = self.reading.number(node, f"{what} of {self.axis.name} [{self.unit}]", low, high)
+        return math.nan if value is None else value
 
-    def levels(self, node: Node, known: Map[str, Node], design: str) -> tuple[float, ...]:
+    def levels(self, node: Node, entries: Map[str, Node], design: str) -> tuple[float, ...]:
         """Returns the ascending levels of the axis, or the ends of its range for a space-filling design.
 
         Args:
             node: Mapping of the axis.
-            known: Values of the mapping by key.
+            entries: Values of the mapping by key.
             design: Name of the design.
         """
         faults, name = self.reading.faults, self.axis.name
-        if ("levels" in known) == ("range" in known):
-            found = "both levels and range" if "levels" in known else "neither levels nor range"
-            faults.add(node.location, f"the axis {name} has {found}; give one of them")
+        if ("levels" in entries) == ("range" in entries):
+            found_keys = "both levels and range" if "levels" in entries else "neither levels nor range"
+            faults.add(node.location, f"the axis {name} has {found_keys}; give one of them")
             return ()
-        if "levels" in known and design != ONE_AT_A_TIME:
+        if "levels" in entries and design != ONE_AT_A_TIME:
             text = f"the design {design} needs a range of {name}: write range: [LOW, HIGH]"
-            faults.add(known["levels"].location, text)
+            faults.add(entries["levels"].location, text)
             return ()
-        if "steps" in known and ("levels" in known or design != ONE_AT_A_TIME):
-            faults.add(known["steps"].location, f"steps of {name} belongs to range and {ONE_AT_A_TIME}; remove it")
-        if "levels" in known:
-            return self._listed(known["levels"])
-        ends = self._ends(known["range"])
+        if "steps" in entries and ("levels" in entries or design != ONE_AT_A_TIME):
+            faults.add(entries["steps"].location, f"steps of {name} belongs to range and {ONE_AT_A_TIME}; remove it")
+        if "levels" in entries:
+            return self._listed_levels(entries["levels"])
+        ends = self._ends(entries["range"])
         if not ends or design != ONE_AT_A_TIME:
             return ends
-        steps = self.reading.count(known["steps"], "steps", 2, MAX_LEVELS) if "steps" in known else None
+        steps = self.reading.count(entries["steps"], "steps", 2, MAX_LEVELS) if "steps" in entries else None
         last = (steps or DEFAULT_STEPS) - 1
         levels = (ends[0] + index / last * (ends[1] - ends[0]) for index in range(last + 1))
         return tuple(dict.fromkeys(rounded_level(level) for level in levels))
 
-    def _listed(self, node: Node) -> tuple[float, ...]:
+    def _listed_levels(self, node: Node) -> tuple[float, ...]:
         items = self.reading.items(node, f"levels of {self.axis.name}", "[0, 10, 20]") or ()
-        found: list[float] = []
+        levels: list[float] = []
         for item in items:
             value = self.number(item, "each level")
-            if value in found:
+            if value in levels:
                 self.reading.faults.add(item.location, f"the axis {self.axis.name} has the level {value:g} twice")
-            found.append(value)
-        return tuple(sorted(found))
+            levels.append(value)
+        return tuple(sorted(levels))
 
     def _ends(self, node: Node) -> tuple[float, ...]:
         items = self.reading.items(node, f"range of {self.axis.name}", "[0, 20]") or ()
@@ -152,5 +152,5 @@ class _AxisValues:
 
 
 def rounded_level(value: float) -> float:
-    """Returns a computed level with `DIGITS` significant digits."""
-    return float(f"{value:.{DIGITS}g}")
+    """Returns a computed level with `LEVEL_DIGITS` significant digits."""
+    return float(f"{value:.{LEVEL_DIGITS}g}")

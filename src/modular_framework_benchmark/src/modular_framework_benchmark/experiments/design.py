@@ -67,7 +67,7 @@ def _episode(experiment: Experiment, combination: Combination, trial: int, numbe
         configuration=dict(combination.configuration),
         trial=trial,
         seed=generator_of(experiment.seed, "episode", pair_key, trial).randint(1, MAX_SEED),
-        settings=_drawn(experiment, combination, pair_key, trial),
+        settings=_draw_settings(experiment, combination, pair_key, trial),
     )
 
 
@@ -76,7 +76,7 @@ def pair_of(configuration: Mapping[str, str], *excluded: str) -> str:
     return ",".join(f"{name}={configuration[name]}" for name in sorted(configuration) if name not in excluded)
 
 
-def _drawn(experiment: Experiment, combination: Combination, pair_key: str, trial: int) -> EpisodeSettings:
+def _draw_settings(experiment: Experiment, combination: Combination, pair_key: str, trial: int) -> EpisodeSettings:
     """Returns the settings of one episode, with its scene or problem."""
     key, drawn = (experiment.seed, pair_key, trial), dict[str, Any]()
     if combination.objects:

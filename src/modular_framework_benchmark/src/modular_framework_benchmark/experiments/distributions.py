@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
-ALLOWED = "a number, [LOW, HIGH], {normal: [MEAN, DEVIATION]} or {choice: [A, B, ...]}"
-DIGITS = 6
+ALLOWED_DISTRIBUTIONS = "a number, [LOW, HIGH], {normal: [MEAN, DEVIATION]} or {choice: [A, B, ...]}"
+DRAW_DIGITS = 6
 """Decimals of drawn numbers, so that the record shows the exact value."""
 
 
@@ -46,7 +46,7 @@ class Uniform:
 
     def draw(self, generator: random.Random) -> float:
         """Returns a number between `low` and `high`."""
-        return round(generator.uniform(self.low, self.high), DIGITS)
+        return round(generator.uniform(self.low, self.high), DRAW_DIGITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Normal:
 
     def draw(self, generator: random.Random) -> float:
         """Returns a normally distributed number."""
-        return round(generator.gauss(self.mean, self.deviation), DIGITS)
+        return round(generator.gauss(self.mean, self.deviation), DRAW_DIGITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def read_distribution(node: Node, what: str, reading: Reading) -> Distribution |
             if value is not None:
                 return Fixed(value)
             if not isinstance(node.value, (int, float)):
-                reading.faults.add(node.location, f"{what} must be {ALLOWED}, found {kind_of(node)}")
+                reading.faults.add(node.location, f"{what} must be {ALLOWED_DISTRIBUTIONS}, found {kind_of(node)}")
             return None
         case Sequence():
             ends = _numbers(node, what, reading)
@@ -122,13 +122,15 @@ def read_distribution(node: Node, what: str, reading: Reading) -> Distribution |
             reading.faults.add(node.location, f"the range of {what} {problem}; allowed: [LOW, HIGH] with LOW <= HIGH")
             return None
         case Mapping():
-            return _named(node, what, reading)
+            return _read_named_distribution(node, what, reading)
 
 
-def _named(node: Mapping, what: str, reading: Reading) -> Distribution | None:
+def _read_named_distribution(node: Mapping, what: str, reading: Reading) -> Distribution | None:
     if len(node.entries) != 1 or not set(node.entries) <= {"normal", "choice"}:
         keys = ", ".join(node.entries) or "none"
-        reading.faults.add(node.location, f"{what} must be {ALLOWED}, found a mapping with the keys: {keys}")
+        reading.faults.add(
+            node.location, f"{what} must be {ALLOWED_DISTRIBUTIONS}, found a mapping with the keys: {keys}"
+        )
         return None
     (name, value), *_ = node.entries.items()
     numbers = _numbers(value, what, reading)
@@ -145,8 +147,8 @@ def _named(node: Mapping, what: str, reading: Reading) -> Distribution | None:
 def _numbers(node: Node, what: str, reading: Reading) -> list[float] | None:
     items = reading.items(node, what, "[-0.2, 0.2]")
     values = [reading.number(item, f"each number of {what}") for item in items or ()]
-    known = [value for value in values if value is not None]
-    return known if items is not None and len(known) == len(values) else None
+    numbers = [value for value in values if value is not None]
+    return numbers if items is not None and len(numbers) == len(values) else None
 
 
 def generator_of(*key: object) -> random.Random:

@@ -90,7 +90,7 @@ class Experiment:
     files: Mapping[str, str]
     substitutions: tuple[str, ...] = ()
 
-    def described(self, digest: str, ran_with: Mapping[str, str]) -> ExperimentDescription:
+    def describe(self, digest: str, ran_with: Mapping[str, str]) -> ExperimentDescription:
         """Returns the description for the result database.
 
         Args:

@@ -14,7 +14,7 @@ from typing import Any
 from modular_framework_benchmark.experiments.experiment import Combination, Experiment, Stopping, StoppingKind
 from modular_framework_benchmark.experiments.factor_reading import (
     Levels,
-    combined,
+    combined_settings,
     note_conflicts,
     note_equal_levels,
     note_unused,
@@ -162,7 +162,7 @@ class _Reader:
         name = reading.name(entries["experiment"], "experiment") if "experiment" in entries else ""
         factors = self._factors()
         own = {factor: levels for factor, levels in factors.items() if factor != PERTURBATION}
-        compared = self._compared(own)
+        compared = self._compared_factor(own)
         design = read_design(entries.get("design"), own, reading) if own else []
         self._note_unpaired(design, compared)
         design = with_perturbations(design, factors)
@@ -200,7 +200,9 @@ class _Reader:
             stopping=stopping,
             workers=int(numbers["workers"] or 1),
             record=record,
-            files=_digests(metric_files(metric_specs) + [file for one in combinations for file in one.files]),
+            files=_digests(
+                metric_files(metric_specs) + [file for combination in combinations for file in combination.files]
+            ),
             substitutions=tuple(self._substitutions),
         )
 
@@ -219,7 +221,7 @@ class _Reader:
             note_unused(factors, self._base, node, self._reading)
         return factors
 
-    def _compared(self, factors: Levels) -> str:
+    def _compared_factor(self, factors: Levels) -> str:
         node = self._root.entries.get("compare")
         name = self._reading.choice(node, "compare", tuple(factors)) if node is not None and factors else None
         if node is not None and name is not None and len(factors[name]) < 2:
@@ -233,11 +235,11 @@ class _Reader:
             return
         partners: dict[tuple[tuple[str, str], ...], set[str]] = {}
         for item in design:
-            rest = tuple(sorted((name, label) for name, label in item.items() if name != compared))
-            partners.setdefault(rest, set()).add(item[compared])
-        for rest, methods in partners.items():
+            other_levels = tuple(sorted((name, label) for name, label in item.items() if name != compared))
+            partners.setdefault(other_levels, set()).add(item[compared])
+        for other_levels, methods in partners.items():
             if len(methods) < 2:
-                where = ", ".join(f"{name} {label}" for name, label in rest) or "the experiment"
+                where = ", ".join(f"{name} {label}" for name, label in other_levels) or "the experiment"
                 self._reading.faults.add(
                     node.location, f"{where} has only {compared} '{min(methods)}'; add another one to compare it with"
                 )
@@ -282,17 +284,17 @@ class _Reader:
     def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[MetricSpec, ...]]:
         if self._mode is None:  # the available metrics depend on the mode
             return (), ()
-        budgets = {one.settings.budget_s for one in combinations}
+        budgets = {combination.settings.budget_s for combination in combinations}
         budget_s = budgets.pop() if len(budgets) == 1 else None
-        node, known = self._root.entries.get("metrics"), dict(self._known.get(self._mode, {}))
+        node, known_metrics = self._root.entries.get("metrics"), dict(self._known.get(self._mode, {}))
         missing = {
             name: needs
             for name, (is_available, needs) in CONDITIONAL_METRICS.items()
-            if combinations and not any(is_available(one.settings) for one in combinations)
+            if combinations and not any(is_available(combination.settings) for combination in combinations)
         }
         if node is None:
-            known = {name: metric for name, metric in known.items() if name not in missing}
-        metrics, metric_specs = read_metrics(node, known, budget_s, self._reading)
+            known_metrics = {name: metric for name, metric in known_metrics.items() if name not in missing}
+        metrics, metric_specs = read_metrics(node, known_metrics, budget_s, self._reading)
         for name, needs in missing.items():
             if node is not None and name in metric_specs:
                 self._reading.faults.add(node.location, f"the metric '{name}' needs {needs}")
@@ -313,23 +315,25 @@ class _Reader:
         if mapping is None:
             return RecordedFiles()
         kinds = tuple(item.name for item in fields(RecordedFiles))
-        known = corrected_keys(mapping, kinds, "the key of record", self._reading.faults)
-        return RecordedFiles(**{key: bool(self._reading.truth(value, key)) for key, value in known.entries.items()})
+        kinds_node = corrected_keys(mapping, kinds, "the key of record", self._reading.faults)
+        return RecordedFiles(
+            **{key: bool(self._reading.truth(value, key)) for key, value in kinds_node.entries.items()}
+        )
 
     def _combinations(self, factors: Levels, design: list[dict[str, str]]) -> tuple[Combination, ...]:
         if self._mode is None or not self._refers_to_factors or not all(factors.values()):
             return ()
-        found, resolved = [], {}
+        combinations, resolved = [], {}
         for item in design:
-            node = combined(self._base, factors, item, self._meant_factors)
+            node = combined_settings(self._base, factors, item, self._meant_factors)
             read = MODES[self._mode].read(node, self._reading)
-            resolved[tuple(item.items())] = self._resolved(read)
-            found.append(Combination(item, read.settings, read.objects, read.problems))
+            resolved[tuple(item.items())] = self._resolve_settings(read)
+            combinations.append(Combination(item, read.settings, read.objects, read.problems))
         if not len(self._reading.faults):
             note_equal_levels(factors, resolved, self._reading)
-        return tuple(found)
+        return tuple(combinations)
 
-    def _resolved(self, read: ReadSettings[Any]) -> str:
+    def _resolve_settings(self, read: ReadSettings[Any]) -> str:
         """Resolves the names in a combination's settings; returns a text that is equal for equal executions."""
         check = self._checks.get(str(self._mode))
         checked = CheckedSettings((), as_json(read.settings)) if check is None else check(read)
@@ -350,20 +354,20 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
         reading: Reader that collects faults.
     """
     keys = ("rule", "metric", "smallest_difference")
-    known = corrected_keys(node, keys, "the key of stopping", reading.faults)
+    entries_node = corrected_keys(node, keys, "the key of stopping", reading.faults)
     kinds = [kind.value for kind in StoppingKind]
-    if "rule" not in known.entries:
+    if "rule" not in entries_node.entries:
         reading.faults.add(node.location, f"stopping has no rule; allowed: {', '.join(kinds)}")
         return Stopping()
-    kind = StoppingKind(reading.choice(known.entries["rule"], "rule", kinds) or "fixed")
+    kind = StoppingKind(reading.choice(entries_node.entries["rule"], "rule", kinds) or "fixed")
     values: dict[str, Any] = {}
-    if "smallest_difference" in known.entries:
+    if "smallest_difference" in entries_node.entries:
         values["smallest_difference"] = reading.number(
-            known.entries["smallest_difference"], "smallest_difference", 1e-9, 1.0
+            entries_node.entries["smallest_difference"], "smallest_difference", 1e-9, 1.0
         )
-    if "metric" in known.entries:
+    if "metric" in entries_node.entries:
         names = dict.fromkeys(["success", *(metric.name for metric in metrics)])
-        values["metric"] = reading.choice(known.entries["metric"], "the metric of stopping", names)
+        values["metric"] = reading.choice(entries_node.entries["metric"], "the metric of stopping", names)
     if kind is StoppingKind.FIXED and values:
         reading.faults.add(node.location, "the rule fixed has no other keys; remove them, or write sequential")
     return Stopping(kind, **{key: value for key, value in values.items() if value is not None})

@@ -12,9 +12,9 @@ from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.setting_trees import (
     leaves,
     level_label,
-    merged,
+    merge_settings,
     references,
-    substituted,
+    substitute_levels,
 )
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
@@ -61,8 +61,8 @@ def _read_levels(factor: str, node: Node, mode_keys: Collection[str], reading: R
         for label, value in node.entries.items():
             settings = reading.mapping(value, f"the level '{label}'", "{arguments: {...}}")
             if settings is not None:
-                known = corrected_keys(settings, mode_keys, f"what level '{label}' sets,", reading.faults)
-                levels[label] = Level(Scalar(label, node.keys[label]), known)
+                known_settings = corrected_keys(settings, mode_keys, f"what level '{label}' sets,", reading.faults)
+                levels[label] = Level(Scalar(label, node.keys[label]), known_settings)
     elif isinstance(node, Sequence):
         for item in node.items:
             if not isinstance(item, Scalar) or item.value is None or item.value == "":
@@ -137,8 +137,8 @@ def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...]
     for name, levels in factors.items():
         runs: dict[str, dict[tuple[tuple[str, str], ...], str]] = {label: {} for label in levels}
         for combination, text in resolved.items():
-            rest = tuple(item for item in combination if item[0] != name)
-            runs[dict(combination)[name]][rest] = text
+            other_levels = tuple(item for item in combination if item[0] != name)
+            runs[dict(combination)[name]][other_levels] = text
         for one, other in itertools.combinations(levels, 2):
             if runs[one] and runs[one] == runs[other] and all(runs[one].values()):
                 reading.faults.add(
@@ -147,22 +147,24 @@ def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...]
                 )
 
 
-def combined(base: Mapping, factors: Levels, configuration: Map[str, str], meant: Map[str, str]) -> Mapping:
+def combined_settings(
+    base: Mapping, factors: Levels, configuration: Map[str, str], intended_factors: Map[str, str]
+) -> Mapping:
     """Returns the base settings overridden by the settings of one level per factor.
 
     Args:
         base: Settings of every combination.
         factors: Levels of each factor.
         configuration: Label of a level of each factor.
-        meant: Intended factor of each misspelt `$NAME`, by NAME.
+        intended_factors: Intended factor of each misspelt `$NAME`, by NAME.
     """
     chosen = {name: factors[name][label] for name, label in configuration.items()}
     tree = base
     for level in chosen.values():
-        tree = merged(tree, level.settings)
+        tree = merge_settings(tree, level.settings)
     values = {name: level.value for name, level in chosen.items()}
-    values |= {name: values[factor] for name, factor in meant.items()}
-    return substituted(tree, values)  # type: ignore[return-value]
+    values |= {name: values[factor] for name, factor in intended_factors.items()}
+    return substitute_levels(tree, values)  # type: ignore[return-value]
 
 
 def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[dict[str, str]]:
@@ -183,7 +185,7 @@ def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[di
         return full
     listed: list[dict[str, str]] = []
     for item in reading.items(node, "design", "[{grasp_method: above, object: can}]") or ():
-        configuration = _listed(item, factors, reading)
+        configuration = _listed_combination(item, factors, reading)
         if configuration is not None and configuration in listed:
             reading.faults.add(item.location, "this combination is listed twice; remove one of them")
         elif configuration is not None:
@@ -191,7 +193,7 @@ def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[di
     return listed
 
 
-def _listed(item: Node, factors: Levels, reading: Reading) -> dict[str, str] | None:
+def _listed_combination(item: Node, factors: Levels, reading: Reading) -> dict[str, str] | None:
     mapping = reading.mapping(item, "each combination of design", "{grasp_method: above, object: can}")
     if mapping is None:
         return None
@@ -202,8 +204,8 @@ def _listed(item: Node, factors: Levels, reading: Reading) -> dict[str, str] | N
         if value is None:
             reading.faults.add(item.location, f"this combination has no level of factor '{name}'; add it")
         elif not isinstance(value, Scalar) or level_label(value) not in levels:
-            found = level_label(value) if isinstance(value, Scalar) else kind_of(value)
-            reading.faults.add_unknown(value.location, f"the level of '{name}'", found, levels)
+            found_text = level_label(value) if isinstance(value, Scalar) else kind_of(value)
+            reading.faults.add_unknown(value.location, f"the level of '{name}'", found_text, levels)
         else:
             configuration[name] = level_label(value)
     return configuration if len(configuration) == len(factors) else None

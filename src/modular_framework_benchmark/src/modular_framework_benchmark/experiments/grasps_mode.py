@@ -56,13 +56,13 @@ def _finish(
         return read
     before, target = len(reading.faults), read.settings.target
     objects = placed_objects(nodes, DEFAULT_LAUNCH, {}, reading)
-    names = [found.name for found in objects]
+    names = [item.name for item in objects]
     if not nodes:
         reading.faults.add(read.node.entries["objects"].location, "objects is empty; add at least the object to grasp")
     elif target and target not in names and len(reading.faults) == before:
         reading.faults.add_unknown(read.node.entries["target"].location, "the target", target, names)
     settings = replace(read.settings, target=target or (names[0] if names else ""))
-    with_files = tuple(replace(found, model=str(found.file)) for found in objects)
+    with_files = tuple(replace(item, model=str(item.file)) for item in objects)
     return replace(read, settings=settings, objects=with_files)
 
 

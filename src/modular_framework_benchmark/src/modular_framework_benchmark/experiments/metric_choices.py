@@ -22,33 +22,33 @@ EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
 
 
 def read_metrics(
-    node: Node | None, known: Map[str, Metric], budget_s: float | None, reading: Reading
+    node: Node | None, known_metrics: Map[str, Metric], budget_s: float | None, reading: Reading
 ) -> tuple[tuple[Metric, ...], tuple[MetricSpec, ...]]:
     """Returns the metrics, and their form in the episodes' settings.
 
     Args:
         node: List of the file; None for all known metrics.
-        known: Metrics of the mode, keyed by name.
+        known_metrics: Metrics of the mode, keyed by name.
         budget_s: Time budget of a planner or solver, the limit of its times [s]; None without a budget.
         reading: Reader that collects faults.
     """
     if node is None:
-        return tuple(_limited(metric, budget_s) for metric in known.values()), tuple(known)
+        return tuple(_limited_metric(metric, budget_s) for metric in known_metrics.values()), tuple(known_metrics)
     metrics: dict[str, Metric] = {}
     metric_specs: list[MetricSpec] = []
     for item in reading.items(node, "metrics", "[success, task_time]") or ():
-        found = _read_metric(item, known, reading)
-        if found is None:
+        metric_and_spec = _read_metric(item, known_metrics, reading)
+        if metric_and_spec is None:
             continue
-        metric, metric_spec = found
+        metric, metric_spec = metric_and_spec
         if metric.name.lower() in (name.lower() for name in metrics):
             reading.faults.add(item.location, f"metrics has '{metric.name}' twice; remove one, or give it another name")
-        metrics[metric.name] = _limited(metric, budget_s)
+        metrics[metric.name] = _limited_metric(metric, budget_s)
         metric_specs.append(metric_spec)
     return tuple(metrics.values()), tuple(metric_specs)
 
 
-def _limited(metric: Metric, budget_s: float | None) -> Metric:
+def _limited_metric(metric: Metric, budget_s: float | None) -> Metric:
     """Returns a duration with its limit; the time limit of an episode is not used, because its clock differs."""
     if metric.kind is not MetricKind.TIME or metric.limit is not None:
         return metric
@@ -58,36 +58,38 @@ def _limited(metric: Metric, budget_s: float | None) -> Metric:
     return dataclasses.replace(metric, limit=budget_s if within_budget else None)
 
 
-def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple[Metric, MetricSpec] | None:
+def _read_metric(item: Node, known_metrics: Map[str, Metric], reading: Reading) -> tuple[Metric, MetricSpec] | None:
     if isinstance(item, Mapping) and "function" in item.entries:
         return _own_metric(item, reading)
     if isinstance(item, Mapping):
-        return _known_with_limit(item, known, reading)
+        return _known_with_limit(item, known_metrics, reading)
     name = reading.text(item, "each of metrics")
     if name is None:
         return None
     if ".py:" in name:
         return _own_metric(Mapping({"function": item}, {"function": item.location}, item.location), reading)
-    if name not in known:
+    if name not in known_metrics:
         reading.faults.add(
             item.location,
-            f"the metric '{name}' is unknown; {listing(known)}, or a user's function: FILE.py:NAME"
-            f"{nearest(name, known)}",
+            f"the metric '{name}' is unknown; {listing(known_metrics)}, or a user's function: FILE.py:NAME"
+            f"{nearest(name, known_metrics)}",
         )
         return None
-    return known[name], name
+    return known_metrics[name], name
 
 
-def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) -> tuple[Metric, MetricSpec] | None:
+def _known_with_limit(
+    item: Mapping, known_metrics: Map[str, Metric], reading: Reading
+) -> tuple[Metric, MetricSpec] | None:
     node = corrected_keys(item, KNOWN_KEYS, "the key of a metric", reading.faults)
     if "metric" not in node.entries:
         reading.faults.add(item.location, f"a metric needs the key metric or function, such as {EXAMPLE}")
         return None
-    found = _read_metric(node.entries["metric"], known, reading)
+    metric_and_spec = _read_metric(node.entries["metric"], known_metrics, reading)
     limit = reading.number(node.entries["limit"], "limit", 0.0) if "limit" in node.entries else None
-    if found is None or limit is None:
-        return found
-    return dataclasses.replace(found[0], limit=limit), found[1]
+    if metric_and_spec is None or limit is None:
+        return metric_and_spec
+    return dataclasses.replace(metric_and_spec[0], limit=limit), metric_and_spec[1]
 
 
 def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | None:

@@ -107,7 +107,7 @@ Finish = Callable[[ReadSettings[Any], Sequence[ObjectNodes], Reading], ReadSetti
 """Check of the relations between keys, which finds the models of the objects."""
 
 
-def _as_read(read: ReadSettings[Any], nodes: Sequence[ObjectNodes], reading: Reading) -> ReadSettings[Any]:
+def _unchanged_settings(read: ReadSettings[Any], nodes: Sequence[ObjectNodes], reading: Reading) -> ReadSettings[Any]:
     return read
 
 
@@ -129,7 +129,7 @@ class Mode:
     runner: str
     check: str
     components: frozenset[str]
-    finish: Finish = _as_read
+    finish: Finish = _unchanged_settings
 
     @property
     def keys(self) -> Mapping[str, tuple[str, SettingKey]]:

@@ -52,10 +52,10 @@ def read_perturbation(reading: ValueReading, node: Node, key: str) -> Perturbati
     mapping = reading.mapping(node, key, "{object_mass: 2}")
     if mapping is None:
         return None
-    known = corrected_keys(mapping, tuple(AXES), "the axis", reading.faults)
+    entries_node = corrected_keys(mapping, tuple(AXES), "the axis", reading.faults)
     values = {
         name: number
-        for name, value in known.entries.items()
+        for name, value in entries_node.entries.items()
         if (number := reading.number(value, name, AXES[name].low, AXES[name].high)) is not None
     }
     return Perturbation(**values)
@@ -80,18 +80,22 @@ class PerturbReader:
         mapping = reading.mapping(node, "perturb", EXAMPLE)
         if mapping is None:
             return None
-        known = corrected_keys(mapping, KEYS, "the key of perturb", reading.faults).entries
-        design = reading.choice(known["design"], "design", DESIGNS) if "design" in known else ONE_AT_A_TIME
-        wanted = (
-            reading.number(known["wanted_success"], "wanted_success", 0.01, 0.99) if "wanted_success" in known else 0.5
+        entries = corrected_keys(mapping, KEYS, "the key of perturb", reading.faults).entries
+        design = reading.choice(entries["design"], "design", DESIGNS) if "design" in entries else ONE_AT_A_TIME
+        wanted_success = (
+            reading.number(entries["wanted_success"], "wanted_success", 0.01, 0.99)
+            if "wanted_success" in entries
+            else 0.5
         )
-        points = self._points(known, design or ONE_AT_A_TIME)
-        self._read_axes(node, known.get("axes"), design or ONE_AT_A_TIME)
-        if len(reading.faults) > before or design is None or wanted is None or points is None:
+        points = self._points(entries, design or ONE_AT_A_TIME)
+        self._read_axes(node, entries.get("axes"), design or ONE_AT_A_TIME)
+        if len(reading.faults) > before or design is None or wanted_success is None or points is None:
             return None
         levels = self._one_at_a_time() if design == ONE_AT_A_TIME else self._space_filling(design, points)
         distinct = {level.label: level for level in levels}
-        return Perturbations(tuple(axis.described for axis in self._axes), tuple(distinct.values()), design, wanted)
+        return Perturbations(
+            tuple(axis.perturbed_axis for axis in self._axes), tuple(distinct.values()), design, wanted_success
+        )
 
     def factor_levels(self, perturbations: Perturbations) -> dict[str, Level]:
         """Returns the levels of the factor `perturbation`, whose settings have SI units."""
@@ -107,8 +111,8 @@ class PerturbReader:
             levels[level.label] = Level(Scalar(level.label, location), settings)
         return levels
 
-    def _points(self, known: Map[str, Node], design: str) -> int | None:
-        node = known.get("points")
+    def _points(self, entries: Map[str, Node], design: str) -> int | None:
+        node = entries.get("points")
         if node is None:
             return DEFAULT_POINTS
         points = self._reading.count(node, "points", 2, MAX_LEVELS)
@@ -127,8 +131,8 @@ class PerturbReader:
         if axes is None or mapping is not None and not mapping.entries:
             reading.faults.add(node.location, f"perturb has no axes; {listing(AXES)}; write {EXAMPLE}")
         if mapping is not None:
-            known = corrected_keys(mapping, tuple(AXES), "the axis", reading.faults)
-            read = (read_axis(AXES[name], value, design, reading) for name, value in known.entries.items())
+            axes_node = corrected_keys(mapping, tuple(AXES), "the axis", reading.faults)
+            read = (read_axis(AXES[name], value, design, reading) for name, value in axes_node.entries.items())
             self._axes = [axis for axis in read if axis is not None]
 
     def _one_at_a_time(self) -> Iterator[PerturbedLevel]:
@@ -177,8 +181,8 @@ def perturbation_factor(experiment: Mapping, mode: str | None, reading: ValueRea
             reading.faults.add(node.location, f"perturb needs the mode {TASK_MODE}, found {mode}; remove it")
         return {}
     reader = PerturbReader(reading, seed_of(experiment))
-    found = reader.read(node)
-    return {} if found is None else {PERTURBATION: reader.factor_levels(found)}
+    perturbations = reader.read(node)
+    return {} if perturbations is None else {PERTURBATION: reader.factor_levels(perturbations)}
 
 
 def with_perturbations(design: list[dict[str, str]], factors: Levels) -> list[dict[str, str]]:
@@ -200,8 +204,8 @@ def seed_of(experiment: Mapping) -> int:
         experiment: Mapping of the experiment file.
     """
     node = experiment.entries.get("seed")
-    found = None if node is None else ValueReading(FaultList()).count(node, "seed", 0)
-    return 1 if found is None else found
+    seed = None if node is None else ValueReading(FaultList()).count(node, "seed", 0)
+    return 1 if seed is None else seed
 
 
 def perturbations_of(text: str) -> Perturbations | None:
@@ -217,10 +221,10 @@ def perturbations_of(text: str) -> Perturbations | None:
     root = loads(text, "the stored experiment", faults)
     if not isinstance(root, Mapping) or "perturb" not in root.entries:
         return None
-    found = PerturbReader(ValueReading(faults), seed_of(root)).read(root.entries["perturb"])
-    if found is None:
+    perturbations = PerturbReader(ValueReading(faults), seed_of(root)).read(root.entries["perturb"])
+    if perturbations is None:
         raise ExperimentFault(faults.sorted())
-    return found
+    return perturbations
 
 
 def with_run_labels(perturbations: Perturbations, labels: Iterable[str]) -> Perturbations:
@@ -232,8 +236,8 @@ def with_run_labels(perturbations: Perturbations, labels: Iterable[str]) -> Pert
         perturbations: Perturbations of the experiment file.
         labels: Labels of the levels in the database.
     """
-    known = {level.label: level for level in perturbations.levels}
-    levels = tuple(known.get(label) or PerturbedLevel(label, _values_of(label)) for label in labels)
+    level_of_label = {level.label: level for level in perturbations.levels}
+    levels = tuple(level_of_label.get(label) or PerturbedLevel(label, _values_of(label)) for label in labels)
     return Perturbations(perturbations.axes, levels, perturbations.design, perturbations.wanted_success)
 
 

@@ -76,18 +76,18 @@ class PredicateReading:
         mapping = self.reading.mapping(node, key, "{lifted: 0.10, hold_time: 2.0}")
         if mapping is None:
             return None
-        known = (*SHORT_FORM, "object", *PREDICATES)
-        node = self._corrected(mapping, known, f"the key of {key}")
+        known_keys = (*SHORT_FORM, "object", *PREDICATES)
+        node = self._corrected_keys(mapping, known_keys, f"the key of {key}")
         short = {name: node.entries[name] for name in SHORT_FORM if isinstance(node.entries.get(name), Scalar)}
-        found: dict[str, Any] = {
+        short_form_values: dict[str, Any] = {
             name: self.reading.number(value, name, 0.0, SHORT_FORM[name]) for name, value in short.items()
         }
         if "object" in node.entries:
-            found["object"] = self._model(node.entries["object"], f"the object of {key}", KeyKind.OBJECT)
-        rest = [name for name in node.entries if name not in found]
-        if rest:
-            found["required"] = self._conjunction(_selected(node, rest), key)
-        criteria = SuccessCriteria(**found)
+            short_form_values["object"] = self._model(node.entries["object"], f"the object of {key}", KeyKind.OBJECT)
+        predicate_names = [name for name in node.entries if name not in short_form_values]
+        if predicate_names:
+            short_form_values["required"] = self._conjunction(_selected_entries(node, predicate_names), key)
+        criteria = SuccessCriteria(**short_form_values)
         if criteria.is_pick and not self.names.objects and criteria.object is None and self.names.models is not None:
             text = f"{key} names no object, and objects is empty; add an object there, or name one in {key}"
             self.reading.faults.add(node.location, text)
@@ -122,11 +122,13 @@ class PredicateReading:
         mapping = self.reading.mapping(item, f"each of {key}", EXAMPLE)
         if mapping is None:
             return None
-        node = self._corrected(mapping, (*MILESTONE_KEYS, *PREDICATES), "the key of a milestone")
-        rest = [name for name in node.entries if name not in MILESTONE_KEYS]
-        predicate = self._conjunction(_selected(node, rest), f"a milestone of {key}")
+        node = self._corrected_keys(mapping, (*MILESTONE_KEYS, *PREDICATES), "the key of a milestone")
+        predicate_names = [name for name in node.entries if name not in MILESTONE_KEYS]
+        predicate = self._conjunction(_selected_entries(node, predicate_names), f"a milestone of {key}")
         weight = self.reading.number(node.entries["weight"], "weight", 0.0, 1e6) if "weight" in node.entries else 1.0
-        name = self.reading.name(node.entries["name"], "name") if "name" in node.entries else "_and_".join(rest)
+        name = (
+            self.reading.name(node.entries["name"], "name") if "name" in node.entries else "_and_".join(predicate_names)
+        )
         if predicate is None or weight is None or name is None:
             return None
         return Milestone(name=name, predicate=predicate, weight=weight)
@@ -137,35 +139,35 @@ class PredicateReading:
         if not parts:
             allowed = ", ".join(PREDICATES)
             self.reading.faults.add(node.location, f"{what} has no predicate; add one, such as {EXAMPLE}: {allowed}")
-        known = tuple(part for part in parts if part is not None)
-        if not parts or len(known) < len(parts):
+        known_parts = tuple(part for part in parts if part is not None)
+        if not parts or len(known_parts) < len(parts):
             return None
-        found = known[0] if len(known) == 1 else predicates.All(known)
-        if text := contradiction(found):
+        conjunction = known_parts[0] if len(known_parts) == 1 else predicates.All(known_parts)
+        if text := contradiction(conjunction):
             self.reading.faults.add(node.location, f"{what} contradicts itself: {text}")
-        return found
+        return conjunction
 
     def _predicate(self, name: str, node: Mapping) -> Predicate | None:
         value = node.entries[name]
         if name in CONDITIONS:
             return self._condition(name, value)
         if name == "not":
-            part = self._nested(value, name)
+            part = self._nested_predicate(value, name)
             return None if part is None else predicates.Not(part)
         items = self.reading.items(value, name, f"[{EXAMPLE}, ...]")
-        parts = [self._nested(item, name) for item in items or ()]
-        known = tuple(part for part in parts if part is not None)
-        return COMBINATIONS[name](known) if known and len(known) == len(parts) else None
+        parts = [self._nested_predicate(item, name) for item in items or ()]
+        known_parts = tuple(part for part in parts if part is not None)
+        return COMBINATIONS[name](known_parts) if known_parts and len(known_parts) == len(parts) else None
 
-    def _nested(self, item: Node, name: str) -> Predicate | None:
+    def _nested_predicate(self, item: Node, name: str) -> Predicate | None:
         mapping = self.reading.mapping(item, f"a predicate of {name}", EXAMPLE)
         if mapping is None:
             return None
-        return self._conjunction(self._corrected(mapping, PREDICATES, "the predicate"), f"a predicate of {name}")
+        return self._conjunction(self._corrected_keys(mapping, PREDICATES, "the predicate"), f"a predicate of {name}")
 
-    def _corrected(self, node: Mapping, known: Collection[str], what: str) -> Mapping:
+    def _corrected_keys(self, node: Mapping, known_names: Collection[str], what: str) -> Mapping:
         """Returns a mapping of predicates with known keys only; adds a fault for each unknown key."""
-        return corrected_keys(renamed_key(node, OLD_ON_TOP_OF, ON_TOP_OF), known, what, self.reading.faults)
+        return corrected_keys(renamed_key(node, OLD_ON_TOP_OF, ON_TOP_OF), known_names, what, self.reading.faults)
 
     def _condition(self, name: str, value: Node) -> Condition | None:
         mapping = self.reading.mapping(value, name, "{object: cube_1}")
@@ -192,10 +194,15 @@ class PredicateReading:
                 yield key, self._value(node.entries[key], f"{key} of {name}", declared)
             elif item.default is MISSING:
                 defaults = {KeyKind.OBJECT: self.names.objects[:1], KeyKind.OBJECTS: self.names.objects}
-                found = defaults.get(declared.kind, ())
-                if not found:
+                default_values = defaults.get(declared.kind, ())
+                if not default_values:
                     self.reading.faults.add(node.location, f"{name} needs the key '{key}'; add it")
-                yield key, (found[0] if declared.kind is KeyKind.OBJECT else found) if found else None
+                yield (
+                    key,
+                    (default_values[0] if declared.kind is KeyKind.OBJECT else default_values)
+                    if default_values
+                    else None,
+                )
 
     def _value(self, node: Node, what: str, key: PredicateKey) -> Any:
         match key.kind:
@@ -245,8 +252,8 @@ def read_regions(reading: ValueReading, node: Node, key: str) -> tuple[Region, .
     mapping = reading.mapping(node, key, "{goal: {x: [0.1, 0.2], y: [0.4, 0.5]}}")
     if mapping is None:
         return None
-    found = [_region(reading, name, value) for name, value in mapping.entries.items()]
-    return tuple(region for region in found if region is not None)
+    regions = [_region(reading, name, value) for name, value in mapping.entries.items()]
+    return tuple(region for region in regions if region is not None)
 
 
 def _region(reading: ValueReading, name: str, value: Node) -> Region | None:
@@ -274,5 +281,5 @@ def _span(reading: ValueReading, node: Node, what: str) -> Span | None:
     return values[0], values[1]  # type: ignore[return-value]
 
 
-def _selected(node: Mapping, names: Collection[str]) -> Mapping:
+def _selected_entries(node: Mapping, names: Collection[str]) -> Mapping:
     return Mapping({name: node.entries[name] for name in names}, node.keys, node.location)

@@ -126,8 +126,8 @@ class ValueReading:
         """
         if isinstance(node, Sequence) and node.items:
             return node.items
-        found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
-        self.faults.add(node.location, f"{what} must be a list such as {example}, found {found}")
+        found_text = "an empty list" if isinstance(node, Sequence) else kind_of(node)
+        self.faults.add(node.location, f"{what} must be a list such as {example}, found {found_text}")
         return None
 
     def mapping(self, node: Node, what: str, example: str) -> Mapping | None:

@@ -52,12 +52,12 @@ def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterato
 
 
 def _faults_in(file: ControllerFile, joints: tuple[str, ...]) -> Iterator[str]:
-    known = _controller_types()
+    known_types = _controller_types()
     for name in file.controllers:
         entry = file.parameters[name]
         where, kind = f"{file.path}: controller '{name}'", str(entry["type"])
-        if kind not in known:
-            yield f"{where}: there is no controller type '{kind}'; {listing(known)}{nearest(kind, known)}"
+        if kind not in known_types:
+            yield f"{where}: there is no controller type '{kind}'; {listing(known_types)}{nearest(kind, known_types)}"
         elif kind in BUILT_IN_TYPES:
             for joint in _unknown_joints(entry, joints):
                 yield f"{where}: the robot has no joint '{joint}'; {listing(joints)}{nearest(joint, joints)}"
@@ -87,8 +87,8 @@ def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[Lau
             text = f"robot_hardware names '{part.lstrip('/')}', and there is no parameter '{parameter}'"
             yield LaunchFault(parameter, f"{text}; {listing(sections)}{nearest(part.lstrip('/'), sections)}")
         elif str(kind) not in _hardware_types():
-            known = _hardware_types()
-            hint = f"{listing(known)}{nearest(str(kind), known)}"
+            hardware_types = _hardware_types()
+            hint = f"{listing(hardware_types)}{nearest(str(kind), hardware_types)}"
             yield LaunchFault(parameter, f"parameter '{parameter}': there is no hardware '{kind}'; {hint}")
 
 

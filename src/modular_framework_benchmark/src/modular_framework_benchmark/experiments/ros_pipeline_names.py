@@ -51,11 +51,11 @@ class PipelineNames:
             return
         declared = existing_declaration(PACKAGE, "planning_pipeline").parameters
         pipeline, key, *settings = [*name.removeprefix(self.parent).split("/"), ""]
-        known = (*declared, *self.groups)
+        known_names = (*declared, *self.groups)
         if pipeline not in self.pipelines:
             yield unknown_name(name, "pipeline", pipeline, self.pipelines)
-        elif key not in known:
-            text = f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known)}{nearest(key, known)}"
+        elif key not in known_names:
+            text = f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known_names)}{nearest(key, known_names)}"
             yield LaunchFault(name, text)
         elif key == "planner_configs" and len(settings) > 2:
             yield from self._setting_faults(name, value, pipeline, settings)
@@ -74,9 +74,9 @@ class PipelineNames:
         if name.startswith(self.parent):
             pipeline, _, key = name.removeprefix(self.parent).partition("/")
             key = key.partition("/")[0]
-            known = (*existing_declaration(PACKAGE, "planning_pipeline").parameters, *self.groups)
-            if key not in known and any(misspelling(key, item) for item in known):
-                yield LaunchFault(name, f"pipeline '{pipeline}' has no parameter '{key}'{nearest(key, known)}")
+            known_names = (*existing_declaration(PACKAGE, "planning_pipeline").parameters, *self.groups)
+            if key not in known_names and any(misspelling(key, item) for item in known_names):
+                yield LaunchFault(name, f"pipeline '{pipeline}' has no parameter '{key}'{nearest(key, known_names)}")
 
     def _planner_faults(self, name: str, value: Any, pipeline: str, group: str) -> Iterator[LaunchFault]:
         """Yields the planners in a value that the pipeline does not have."""
@@ -98,16 +98,16 @@ class PipelineNames:
             yield LaunchFault(name, text.replace("; it is ignored", ""))
 
 
-def unknown_name(name: str, what: str, found: str, known: Collection[str]) -> LaunchFault:
+def unknown_name(name: str, what: str, found_text: str, known_names: Collection[str]) -> LaunchFault:
     """Returns the fault of an unknown name.
 
     Args:
         name: Parameter with the unknown name; "" if the name is not the value of a parameter.
         what: Kind of name, such as `pipeline`.
-        found: Unknown name.
-        known: Existing names.
+        found_text: Unknown name.
+        known_names: Existing names.
     """
-    text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
+    text = f"there is no {what} '{found_text}'; {listing(known_names)}{nearest(found_text, known_names)}"
     return LaunchFault(name, f"parameter '{name}': {text}" if name else text)
 
 
@@ -116,12 +116,12 @@ CAPABILITY_PARAMETERS = ("capabilities", "disable_capabilities")
 CAPABILITIES = (*DEFAULT_CAPABILITIES, *OPTIONAL_CAPABILITIES)
 
 
-def move_group_faults(names: DeclaredNames, given: Mapping[str, Any]) -> Iterator[LaunchFault]:
+def move_group_faults(names: DeclaredNames, parameters: Mapping[str, Any]) -> Iterator[LaunchFault]:
     """Yields unknown names.
 
     Args:
         names: Parameters of the launch.
-        given: Parameters set by the experiment, by full name. Capabilities are checked only in these, since other
+        parameters: Parameters set by the experiment, by full name. Capabilities are checked only in these, since other
             configuration packages may name capabilities that only MoveIt has.
     """
     for name, value in names.naming(DETECTOR):
@@ -133,7 +133,7 @@ def move_group_faults(names: DeclaredNames, given: Mapping[str, Any]) -> Iterato
         if value.replace("::", "/") not in CONTROLLER_MANAGERS:
             hint = f"{listing(CONTROLLER_MANAGERS)}{nearest(value, CONTROLLER_MANAGERS)}"
             yield LaunchFault(name, f"parameter '{name}': there is no controller manager '{value}'; {hint}")
-    for name, value in leaves(given).items():
+    for name, value in leaves(parameters).items():
         if name.rpartition("/")[2] in CAPABILITY_PARAMETERS and name in names.known or _is_of_pipeline(name):
             yield from _capability_faults(name, value)
 

@@ -63,7 +63,7 @@ class RosResourceLookup:
 
     def launch_arguments(self, launch: str) -> Mapping[str, str | None]:
         """Returns the arguments of a launch file with their defaults."""
-        return _known(str(self.launch_file(launch)))
+        return _arguments_of_file(str(self.launch_file(launch)))
 
     def launch_faults(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
         """Returns the errors in the values of launch arguments."""
@@ -119,7 +119,9 @@ class RosResourceLookup:
 
     def _launch_values(self, launch: str, arguments: Mapping[str, str]) -> dict[str, str]:
         path = str(self.launch_file(launch))
-        return _values(path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value))
+        return _argument_values(
+            path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value)
+        )
 
 
 @lru_cache(maxsize=64)
@@ -131,7 +133,7 @@ def _models_of(world: Path, models: Path) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=256)
-def _known(path: str) -> dict[str, str | None]:
+def _arguments_of_file(path: str) -> dict[str, str | None]:
     try:
         return {name: default for name, (_, default) in known_arguments(path).items()}
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException) as error:
@@ -150,7 +152,7 @@ def _argument_faults(path: str, arguments: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=4096)
-def _values(path: str, arguments: tuple[str, ...]) -> dict[str, str]:
+def _argument_values(path: str, arguments: tuple[str, ...]) -> dict[str, str]:
     try:
         return argument_values(path, list(arguments))
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:

@@ -74,7 +74,7 @@ class SceneObject:
         scale = 1.0 if self.size is None else self.size.high / longest_side(self.file)
         return scale * self.perturbation.object_size * math.hypot(*sides(self.file)[:2])
 
-    def sampled(self, key: tuple[object, ...], index: int, draw: int = 0) -> PlacedObject:
+    def sample(self, key: tuple[object, ...], index: int, draw: int = 0) -> PlacedObject:
         """Returns the object with the pose, the size and the perturbation drawn for a trial.
 
         Args:
@@ -88,7 +88,7 @@ class SceneObject:
         if self.surface is not None:
             surface = self.surface.draw(generator_of(*key, OLD_SURFACE))
             numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"], scale or 1.0)
-        return PlacedObject(self.name, self.model, scale=scale, perturbed=self._perturbed(key), **numbers)
+        return PlacedObject(self.name, self.model, scale=scale, perturbed=self._drawn_perturbation(key), **numbers)
 
     def _scale(self, key: tuple[object, ...]) -> float | None:
         """Returns the factor of the model's lengths; None for the model as it is."""
@@ -97,19 +97,19 @@ class SceneObject:
             return None if perturbed == 1.0 else perturbed
         return round(perturbed * self.size.draw(generator_of(*key, SIZE)) / longest_side(self.file), 6)
 
-    def _perturbed(self, key: tuple[object, ...]) -> ObjectPerturbation | None:
+    def _drawn_perturbation(self, key: tuple[object, ...]) -> ObjectPerturbation | None:
         """Returns the perturbation that the world applies besides the scale; None for none."""
         values, error = self.perturbation, (0.0, 0.0)
         if distance_m := values.perceived_pose_error:
             direction_rad = generator_of(*key, "pose_error").uniform(-math.pi, math.pi)
             error = (round(distance_m * math.cos(direction_rad), 9), round(distance_m * math.sin(direction_rad), 9))
-        found = ObjectPerturbation(
+        perturbation = ObjectPerturbation(
             mass=values.object_mass,
             friction=values.object_friction,
             centre_of_mass=values.object_centre_of_mass,
             pose_error=error,
         )
-        return None if found == ObjectPerturbation() else found
+        return None if perturbation == ObjectPerturbation() else perturbation
 
     def is_clear_of(self, placed: PlacedObject, others: Sequence[PlacedObject]) -> bool:
         """Returns whether the object keeps its spacing.
@@ -137,19 +137,19 @@ def sampled_scene(objects: Sequence[SceneObject], key: tuple[object, ...]) -> tu
     for scene in range(MAX_SCENES):
         placed: list[PlacedObject] = []
         for index, item in enumerate(objects):
-            draws = (item.sampled(key, index, scene * MAX_DRAWS + draw) for draw in range(MAX_DRAWS))
-            found = next((drawn for drawn in draws if item.is_clear_of(drawn, placed)), None)
-            if found is None:
+            draws = (item.sample(key, index, scene * MAX_DRAWS + draw) for draw in range(MAX_DRAWS))
+            clear_object = next((drawn for drawn in draws if item.is_clear_of(drawn, placed)), None)
+            if clear_object is None:
                 failed = item
                 break
-            placed.append(found)
+            placed.append(clear_object)
         else:
             return tuple(placed)
     assert failed is not None and failed.node is not None
-    raise ExperimentFault([Fault(failed.node.location, _crowded(failed, objects))])
+    raise ExperimentFault([Fault(failed.node.location, _crowding_fault(failed, objects))])
 
 
-def _crowded(failed: SceneObject, objects: Sequence[SceneObject]) -> str:
+def _crowding_fault(failed: SceneObject, objects: Sequence[SceneObject]) -> str:
     before = list(itertools.takewhile(lambda item: item is not failed, objects))
     return (
         f"object '{failed.name}' does not fit: no pose in {MAX_DRAWS * MAX_SCENES} draws is {failed.spacing_m:g} m "
@@ -194,7 +194,7 @@ def read_objects(reading: Reading, node: Node, key: str) -> list[ObjectNodes] | 
     if not isinstance(node, ListNode):
         reading.faults.add(node.location, f"{key} must be a list such as [{EXAMPLE}], found {kind_of(node)}")
         return None
-    return [found for item in node.items if (found := _read_object(item, reading)) is not None]
+    return [nodes for item in node.items if (nodes := _read_object(item, reading)) is not None]
 
 
 def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
@@ -206,10 +206,10 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
         reading.faults.add(node.location, f"an object needs a model; add one, such as {EXAMPLE}")
         return None
     if ("z" in node.entries) == (SURFACE in node.entries):
-        found = f"both z and {SURFACE}" if "z" in node.entries else f"neither z nor {SURFACE}"
+        keys = f"both z and {SURFACE}" if "z" in node.entries else f"neither z nor {SURFACE}"
         reading.faults.add(
             node.location,
-            f"an object has {found}; allowed: z, the height of its frame [m], or {SURFACE}, the height of the surface "
+            f"an object has {keys}; allowed: z, the height of its frame [m], or {SURFACE}, the height of the surface "
             "below it [m]",
         )
     pose = {
@@ -233,42 +233,42 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     return ObjectNodes(node, model, name, pose, surface, size, spacing, count)
 
 
-def _named_objects(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> list[SceneObject]:
+def _named_objects(nodes: ObjectNodes, file: Path, taken_names: set[str], reading: Reading) -> list[SceneObject]:
     """Returns objects with their model's file; adds a fault if another object has the same name.
 
     Args:
-        found: Objects of one model in the experiment file.
+        nodes: Objects of one model in the experiment file.
         file: SDF file of the model.
-        taken: Names of the previous objects; the names of the objects are added.
+        taken_names: Names of the previous objects; the names of the objects are added.
         reading: Reader that collects faults.
     """
-    base = found.name or file.parent.name
-    if found.count is not None:
-        names = [f"{base}_{number}" for number in range(1, found.count + 1)]
-    elif found.name:
-        names = [found.name]
+    base = nodes.name or file.parent.name
+    if nodes.count is not None:
+        names = [f"{base}_{number}" for number in range(1, nodes.count + 1)]
+    elif nodes.name:
+        names = [nodes.name]
     else:
-        numbered = (f"{base}_{number}" for number in range(1, len(taken) + 2))
-        names = [next(free for free in numbered if free not in taken)]
-    if same := taken.intersection(names):
-        location = found.node.entries.get("name", found.node).location
-        reading.faults.add(location, f"two objects have the name '{min(same)}'; rename one of them")
-    taken.update(names)
-    is_path = "/" in found.model or found.model.endswith(".sdf")
+        numbered = (f"{base}_{number}" for number in range(1, len(taken_names) + 2))
+        names = [next(free for free in numbered if free not in taken_names)]
+    if repeated_names := taken_names.intersection(names):
+        location = nodes.node.entries.get("name", nodes.node).location
+        reading.faults.add(location, f"two objects have the name '{min(repeated_names)}'; rename one of them")
+    taken_names.update(names)
+    is_path = "/" in nodes.model or nodes.model.endswith(".sdf")
     objects = [
         SceneObject(
             name,
-            str(file) if is_path else found.model,
+            str(file) if is_path else nodes.model,
             file,
-            found.pose,
-            found.surface,
-            found.size,
-            found.spacing_m,
-            found.node,
+            nodes.pose,
+            nodes.surface,
+            nodes.size,
+            nodes.spacing_m,
+            nodes.node,
         )
         for name in names
     ]
-    _check_model(found.node, objects, reading)
+    _check_model(nodes.node, objects, reading)
     return objects
 
 
@@ -312,7 +312,7 @@ def placed_objects(
         arguments: Arguments of the launch file.
         reading: Reader that collects faults.
     """
-    taken: set[str] = set()
+    taken_names: set[str] = set()
     objects: list[SceneObject] = []
     before = len(reading.faults)
     for item in nodes:
@@ -321,7 +321,7 @@ def placed_objects(
         except UnresolvedReference as error:
             reading.faults.add(item.node.entries["model"].location, str(error))
             continue
-        objects += _named_objects(item, file, taken, reading)
+        objects += _named_objects(item, file, taken_names, reading)
     if len(reading.faults) == before and any(item.spacing_m for item in nodes):
         try:
             sampled_scene(objects, ("check",))

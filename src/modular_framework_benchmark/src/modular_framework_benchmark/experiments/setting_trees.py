@@ -50,7 +50,7 @@ def check_references(node: Node, factors: Map[str, object], faults: FaultList) -
     return unknown
 
 
-def substituted(node: Node, levels: Map[str, Scalar]) -> Node:
+def substitute_levels(node: Node, levels: Map[str, Scalar]) -> Node:
     """Returns a value in which each `$NAME` is replaced by the level of that factor.
 
     Args:
@@ -66,9 +66,9 @@ def substituted(node: Node, levels: Map[str, Scalar]) -> Node:
         case Scalar():
             return node
         case Sequence():
-            return Sequence(tuple(substituted(item, levels) for item in node.items), node.location)
+            return Sequence(tuple(substitute_levels(item, levels) for item in node.items), node.location)
         case Mapping():
-            entries = {key: substituted(value, levels) for key, value in node.entries.items()}
+            entries = {key: substitute_levels(value, levels) for key, value in node.entries.items()}
             return Mapping(entries, node.keys, node.location)
 
 
@@ -83,13 +83,13 @@ def level_label(level: Scalar) -> str:
     return str(level.value).lower() if isinstance(level.value, bool) else str(level.value)
 
 
-def merged(base: Mapping, over: Mapping) -> Mapping:
+def merge_settings(base: Mapping, over: Mapping) -> Mapping:
     """Returns the base overridden by another mapping; mappings in both are merged recursively."""
     entries, keys = dict(base.entries), base.keys | over.keys
     for key, value in over.entries.items():
         before = entries.get(key)
         both = isinstance(before, Mapping) and isinstance(value, Mapping)
-        entries[key] = merged(before, value) if both else value  # type: ignore[arg-type]
+        entries[key] = merge_settings(before, value) if both else value  # type: ignore[arg-type]
     return Mapping(entries, keys, over.location if over.entries else base.location)
 
 

@@ -104,7 +104,7 @@ def _read_extra_parameters(reading: Reading, node: Node, key: str) -> tuple[str,
     return tuple(name for item in items if (name := reading.text(item, f"a name in {key}")) is not None)
 
 
-def _read_later(reading: Reading, node: Node, key: str) -> Any:
+def _placeholder_value(reading: Reading, node: Node, key: str) -> Any:
     """Returns a value that `_finish` replaces, once the names of objects and models are known."""
     return NO_CRITERIA if key == "success" else ()
 
@@ -135,8 +135,8 @@ class TaskSettings(EpisodeSettings):
     warm: bool = setting(Reading.truth, True)
     task: str = setting(_read_task, "")
     regions: tuple[Region, ...] = setting(read_regions, ())
-    success: SuccessCriteria = setting(_read_later, NO_CRITERIA)
-    progress: tuple[Milestone, ...] = setting(_read_later, ())
+    success: SuccessCriteria = setting(_placeholder_value, NO_CRITERIA)
+    progress: tuple[Milestone, ...] = setting(_placeholder_value, ())
     perturbation: Perturbation | None = setting(read_perturbation, None)
 
     @property
@@ -196,14 +196,14 @@ def _finish(
     `arguments` is unreadable if an invalid argument leaves the launched nodes unknown.
     """
     if "launch" in read.unreadable:
-        return _judged(read, KnownNames(), reading)
+        return _with_predicates(read, KnownNames(), reading)
     settings = read.settings
     try:
-        known = reading.resources.launch_arguments(settings.launch)
+        arguments_of_launch = reading.resources.launch_arguments(settings.launch)
     except UnresolvedReference as error:
         reading.faults.add(_location_of(read.node, "launch"), str(error))
-        return _judged(replace(read, unreadable=read.unreadable | {"launch"}), KnownNames(), reading)
-    sound, decides = _sound_arguments(read.node, settings.launch, settings.arguments, known, reading)
+        return _with_predicates(replace(read, unreadable=read.unreadable | {"launch"}), KnownNames(), reading)
+    sound, decides = _sound_arguments(read.node, settings.launch, settings.arguments, arguments_of_launch, reading)
     task = settings.task
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
@@ -216,9 +216,9 @@ def _finish(
     if "objects" in read.unreadable or len(objects) < sum(node.count or 1 for node in nodes):
         names = KnownNames()
     else:
-        names = KnownNames(tuple(found.name for found in objects), _world_models(read, settings.launch, sound, reading))
+        names = KnownNames(tuple(item.name for item in objects), _world_models(read, settings.launch, sound, reading))
     settings = replace(settings, arguments=sound if decides else {}, task=task)
-    read = _judged(replace(read, settings=settings, objects=tuple(objects)), names, reading)
+    read = _with_predicates(replace(read, settings=settings, objects=tuple(objects)), names, reading)
     return read if decides else replace(read, unreadable=read.unreadable | {"arguments"})
 
 
@@ -234,21 +234,23 @@ def _world_models(
         return None
 
 
-def _judged(read: ReadSettings[TaskSettings], names: KnownNames, reading: Reading) -> ReadSettings[TaskSettings]:
+def _with_predicates(
+    read: ReadSettings[TaskSettings], names: KnownNames, reading: Reading
+) -> ReadSettings[TaskSettings]:
     """Returns the settings with their success criteria and milestones."""
     regions = {region.name: region for region in read.settings.regions}
     predicates = PredicateReading(reading, replace(names, regions=regions))
-    found: dict[str, Any] = {}
+    settings_of_key: dict[str, Any] = {}
     for key, reader in (("success", predicates.success), ("progress", predicates.progress)):
         if key in read.node.entries:
-            found[key] = reader(read.node.entries[key], key)
-    unreadable = {key for key, value in found.items() if value is None}
-    settings = replace(read.settings, **{key: found[key] for key in found.keys() - unreadable})
+            settings_of_key[key] = reader(read.node.entries[key], key)
+    unreadable = {key for key, value in settings_of_key.items() if value is None}
+    settings = replace(read.settings, **{key: settings_of_key[key] for key in settings_of_key.keys() - unreadable})
     return replace(read, settings=settings, unreadable=read.unreadable | unreadable)
 
 
 def _sound_arguments(
-    node: Mapping, launch: str, given: Map[str, str], known: Map[str, str | None], reading: Reading
+    node: Mapping, launch: str, arguments: Map[str, str], known_arguments: Map[str, str | None], reading: Reading
 ) -> tuple[dict[str, str], bool]:
     """Returns the valid arguments, and whether they determine the launched nodes.
 
@@ -256,22 +258,22 @@ def _sound_arguments(
     """
     keys = node.entries.get("arguments")
     locations = keys.keys if isinstance(keys, Mapping) else {}
-    sound = {name: value for name, value in given.items() if name in known}
+    sound = {name: value for name, value in arguments.items() if name in known_arguments}
     decides = "arguments" not in node.entries or isinstance(keys, Mapping)
-    for name in given:
-        if name not in known:
+    for name in arguments:
+        if name not in known_arguments:
             what = f"the argument of {launch}"
-            reading.faults.add_unknown(locations[name], what, name, sorted(known), used=given)
-            meant = intended_key(name, [free for free in known if free not in given])
-            if meant is not None:
-                sound[meant] = given[name]
-            decides = decides and meant is not None
+            reading.faults.add_unknown(locations[name], what, name, sorted(known_arguments), used=arguments)
+            intended_name = intended_key(name, [free for free in known_arguments if free not in arguments])
+            if intended_name is not None:
+                sound[intended_name] = arguments[name]
+            decides = decides and intended_name is not None
     wrong = {"": ""}
     while wrong:  # faults of files are found once the other values are right
         wrong = {_argument_in(text): text for text in reading.resources.launch_faults(launch, sound)}
         for name, text in wrong.items():
             reading.faults.add(locations.get(name, _location_of(node, "arguments")), text)
-            is_truth = str(known.get(name)).lower() in ("true", "false")
+            is_truth = str(known_arguments.get(name)).lower() in ("true", "false")
             decides = decides and (name in FILE_ARGUMENTS or is_truth)
         if not wrong.keys() & sound.keys():
             break

@@ -52,8 +52,8 @@ def hold_time(episode: EpisodeMeasurements) -> float | None:
     displacement = None if shake is None else _displacement_in_hand(episode, shake.started_s)
     if shake is None or displacement is None:
         return None
-    lost = displacement[0][displacement[1] > LOST_M]
-    return float(min(lost[0] - shake.started_s if lost.size else shake.duration_s, shake.duration_s))
+    loss_times_s = displacement[0][displacement[1] > LOST_M]
+    return float(min(loss_times_s[0] - shake.started_s if loss_times_s.size else shake.duration_s, shake.duration_s))
 
 
 def _target(episode: EpisodeMeasurements) -> ObjectTrack | None:

@@ -111,8 +111,8 @@ def read_joints(folder: Path) -> JointSamples | None:
     joints = tuple(name.removesuffix("/position") for name in frame.columns if name.endswith("/position"))
 
     def columns(kind: str) -> Array:
-        wanted = [f"{joint}/{kind}" for joint in joints]
-        return np.asarray(frame.reindex(columns=wanted).to_numpy(dtype=float))
+        column_names = [f"{joint}/{kind}" for joint in joints]
+        return np.asarray(frame.reindex(columns=column_names).to_numpy(dtype=float))
 
     times = np.asarray(frame["time_s"].to_numpy(dtype=float))
     return JointSamples(joints, times, *(columns(kind) for kind in ("position", "velocity", "effort", "command")))
@@ -123,13 +123,13 @@ def read_tracking(folder: Path) -> tuple[TrackingSamples, ...]:
     path = folder / TRACKING
     if not path.is_file():
         return ()
-    found = []
+    samples = []
     for controller, rows in pd.read_parquet(path).groupby("controller", sort=True):
         tables = {
             kind: rows.pivot_table(index="time_s", columns="joint", values=kind) for kind in ("desired", "actual")
         }
         desired, actual = tables["desired"], tables["actual"]
-        found.append(
+        samples.append(
             TrackingSamples(
                 str(controller),
                 tuple(map(str, desired.columns)),
@@ -138,4 +138,4 @@ def read_tracking(folder: Path) -> tuple[TrackingSamples, ...]:
                 np.asarray(actual.to_numpy(dtype=float)),
             )
         )
-    return tuple(found)
+    return tuple(samples)

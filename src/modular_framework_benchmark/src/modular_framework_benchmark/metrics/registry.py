@@ -36,13 +36,13 @@ class RegisteredMetric:
 _RATE, _VALUE, _COUNT = MetricKind.RATE, MetricKind.VALUE, MetricKind.COUNT
 _HIGHER, _LOWER = Direction.HIGHER, Direction.LOWER
 _SIMULATED, _WALL = Clock.SIMULATED, Clock.WALL
-_SAID = Source.SAID
+_REPORTED = Source.SAID
 _FRACTION = (0.0, 1.0)
 _NONNEGATIVE = (0.0, None)
 _Bounds = tuple[float | None, float | None]
 
 
-def _registered(
+def _make_metric(
     measure: MetricFunction,
     kind: MetricKind,
     better: Direction,
@@ -70,7 +70,7 @@ def _registered(
     return RegisteredMetric(metric, measure)
 
 
-def _timed(
+def _make_time_metric(
     measure: MetricFunction, better: Direction, clock: Clock, source: Source = Source.MEASURED
 ) -> RegisteredMetric:
     """Registers a function as the metric of a duration.
@@ -81,51 +81,51 @@ def _timed(
         clock: Clock of the duration.
         source: Origin of the values.
     """
-    found = _registered(measure, MetricKind.TIME, better, unit="s", source=source)
-    return replace(found, metric=replace(found.metric, clock=clock))
+    registered = _make_metric(measure, MetricKind.TIME, better, unit="s", source=source)
+    return replace(registered, metric=replace(registered.metric, clock=clock))
 
 
-_ALL = (
-    _registered(task.success, _RATE, _HIGHER),
-    _timed(task.task_time, _LOWER, _SIMULATED),
-    _timed(task.task_wall_time, _LOWER, _WALL),
-    _registered(task.failed_states, _COUNT, _LOWER),
-    _registered(task.progress, MetricKind.PARTIAL_CREDIT, _HIGHER, bounds=_FRACTION),
-    _timed(generation.generation_time, _LOWER, _WALL),
-    _timed(generation.method_processor_time, _LOWER, Clock.PROCESSOR),
-    _registered(generation.generation_success, _RATE, _HIGHER, source=_SAID),
-    _registered(generation.candidates, _COUNT, _HIGHER, source=_SAID),
-    _registered(generation.reachable_share, _VALUE, _HIGHER, bounds=_FRACTION, source=_SAID),
-    _registered(generation.best_rank, _VALUE, _LOWER, bounds=(1.0, None), source=_SAID),
-    _timed(planning.planning_time, _LOWER, _WALL),
-    _timed(planning.planning_processor_time, _LOWER, Clock.PROCESSOR),
-    _registered(planning.concurrent_plans, _COUNT, _LOWER),
-    _timed(planning.search_time, _LOWER, _WALL),
-    _registered(planning.planning_success, _VALUE, _HIGHER, bounds=_FRACTION),
-    _registered(planning.path_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
-    _timed(planning.motion_duration, _LOWER, _SIMULATED),
-    _registered(planning.smoothness, _VALUE, _HIGHER),
-    _registered(planning.clearance, _VALUE, _HIGHER, unit="m"),
-    _registered(planning.attempts, _COUNT, _LOWER),
-    _registered(kinematics.solved_share, _VALUE, _HIGHER, bounds=_FRACTION),
-    _timed(kinematics.solving_time, _LOWER, _WALL),
-    _registered(kinematics.solutions, _COUNT, _HIGHER),
-    _registered(kinematics.position_error, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
-    _registered(kinematics.rotation_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
-    _timed(execution.execution_time, _LOWER, _SIMULATED),
-    _registered(execution.execution_success, _VALUE, _HIGHER, bounds=_FRACTION),
-    _registered(execution.tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
-    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
-    _registered(execution.executed_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
-    _registered(execution.executed_smoothness, _VALUE, _HIGHER),
-    _registered(execution.greatest_effort, _VALUE, _LOWER, unit="Nm", bounds=_NONNEGATIVE),
-    _registered(grasp.lift, _VALUE, _HIGHER, unit="m"),
-    _registered(grasp.slip, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
-    _timed(grasp.grasp_time, _LOWER, _SIMULATED),
-    _timed(grasp.hold_time, _HIGHER, _SIMULATED),
+_REGISTERED_METRICS = (
+    _make_metric(task.success, _RATE, _HIGHER),
+    _make_time_metric(task.task_time, _LOWER, _SIMULATED),
+    _make_time_metric(task.task_wall_time, _LOWER, _WALL),
+    _make_metric(task.failed_states, _COUNT, _LOWER),
+    _make_metric(task.progress, MetricKind.PARTIAL_CREDIT, _HIGHER, bounds=_FRACTION),
+    _make_time_metric(generation.generation_time, _LOWER, _WALL),
+    _make_time_metric(generation.method_processor_time, _LOWER, Clock.PROCESSOR),
+    _make_metric(generation.generation_success, _RATE, _HIGHER, source=_REPORTED),
+    _make_metric(generation.candidates, _COUNT, _HIGHER, source=_REPORTED),
+    _make_metric(generation.reachable_share, _VALUE, _HIGHER, bounds=_FRACTION, source=_REPORTED),
+    _make_metric(generation.best_rank, _VALUE, _LOWER, bounds=(1.0, None), source=_REPORTED),
+    _make_time_metric(planning.planning_time, _LOWER, _WALL),
+    _make_time_metric(planning.planning_processor_time, _LOWER, Clock.PROCESSOR),
+    _make_metric(planning.concurrent_plans, _COUNT, _LOWER),
+    _make_time_metric(planning.search_time, _LOWER, _WALL),
+    _make_metric(planning.planning_success, _VALUE, _HIGHER, bounds=_FRACTION),
+    _make_metric(planning.path_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _make_time_metric(planning.motion_duration, _LOWER, _SIMULATED),
+    _make_metric(planning.smoothness, _VALUE, _HIGHER),
+    _make_metric(planning.clearance, _VALUE, _HIGHER, unit="m"),
+    _make_metric(planning.attempts, _COUNT, _LOWER),
+    _make_metric(kinematics.solved_share, _VALUE, _HIGHER, bounds=_FRACTION),
+    _make_time_metric(kinematics.solving_time, _LOWER, _WALL),
+    _make_metric(kinematics.solutions, _COUNT, _HIGHER),
+    _make_metric(kinematics.position_error, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
+    _make_metric(kinematics.rotation_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _make_time_metric(execution.execution_time, _LOWER, _SIMULATED),
+    _make_metric(execution.execution_success, _VALUE, _HIGHER, bounds=_FRACTION),
+    _make_metric(execution.tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _make_metric(execution.greatest_tracking_error, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _make_metric(execution.executed_length, _VALUE, _LOWER, unit="rad", bounds=_NONNEGATIVE),
+    _make_metric(execution.executed_smoothness, _VALUE, _HIGHER),
+    _make_metric(execution.greatest_effort, _VALUE, _LOWER, unit="Nm", bounds=_NONNEGATIVE),
+    _make_metric(grasp.lift, _VALUE, _HIGHER, unit="m"),
+    _make_metric(grasp.slip, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
+    _make_time_metric(grasp.grasp_time, _LOWER, _SIMULATED),
+    _make_time_metric(grasp.hold_time, _HIGHER, _SIMULATED),
 )
 
-METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _ALL}
+METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _REGISTERED_METRICS}
 """Metrics of the framework, keyed by name."""
 
 
@@ -159,13 +159,13 @@ def load_metric(reference: str) -> MetricFunction:
         raise MetricError(f"metric '{reference}' does not have the form FILE.py:FUNCTION; correct it")
     if not path.is_file():
         raise MetricError(f"metric '{reference}': there is no file {path.resolve()}; correct the path")
-    found = getattr(_module(path), name, None)
-    if not callable(found):
+    function = getattr(_module(path), name, None)
+    if not callable(function):
         defined = [key for key, value in vars(_module(path)).items() if inspect.isfunction(value)]
         raise MetricError(
             f"metric '{reference}': {path} has no function '{name}'; it has {', '.join(defined) or 'none'}"
         )
-    return found  # type: ignore[no-any-return]  # the result is checked when the metric is measured
+    return function  # type: ignore[no-any-return]  # the result is checked when the metric is measured
 
 
 def _module(path: Path) -> ModuleType:
@@ -193,11 +193,11 @@ class MeasuredMetrics:
     faults: Mapping[str, str]
 
 
-def measure(wanted: Iterable[MetricSpec], episode: EpisodeMeasurements) -> MeasuredMetrics:
+def measure(specs: Iterable[MetricSpec], episode: EpisodeMeasurements) -> MeasuredMetrics:
     """Returns the metrics of an episode.
 
     Args:
-        wanted: Metrics to measure.
+        specs: Metrics to measure.
         episode: Measurements of the episode.
 
     Raises:
@@ -205,7 +205,7 @@ def measure(wanted: Iterable[MetricSpec], episode: EpisodeMeasurements) -> Measu
     """
     values: dict[str, float | None] = {}
     faults: dict[str, str] = {}
-    for entry in wanted:
+    for entry in specs:
         if isinstance(entry, str):
             name, function = entry, find_metric(entry).measure
         else:

@@ -57,14 +57,14 @@ class GraspReach:
             except PlanningError:
                 return None
             free = first_free(solutions, checker.is_free)
-            if not free or (number == 0 and not self._checker.is_free(self._as_in_scene(free[0]))):
+            if not free or (number == 0 and not self._checker.is_free(self._positions_in_scene(free[0]))):
                 return None
             if number:
                 travel = max(travel, float(np.max(np.abs(free[0][indices] - seed[indices]))))
             seed = free[0]
         return travel
 
-    def _as_in_scene(self, positions: Array) -> Array:
+    def _positions_in_scene(self, positions: Array) -> Array:
         """Returns positions in which the joints outside the group have the values of the scene."""
         result = self._scene.positions.copy()
         result[self._solver.group.indices] = positions[self._solver.group.indices]

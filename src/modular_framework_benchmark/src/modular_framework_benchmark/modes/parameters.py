@@ -34,10 +34,10 @@ def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> d
     return result
 
 
-def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def merge_parameters(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Returns nested mappings merged recursively; values of `changes` take precedence."""
     result = dict(base)
     for key, value in changes.items():
         old = result.get(key)
-        result[key] = merged(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+        result[key] = merge_parameters(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
     return result

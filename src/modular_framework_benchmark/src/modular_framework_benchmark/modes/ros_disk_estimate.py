@@ -22,8 +22,8 @@ the robot."""
 BAG_BYTES_PER_S, VIDEO_BYTES_PER_S = 0.4e6, 6e3
 DATABASE_BYTES, PLAN_BYTES = 10e3, 20e3
 """An episode in the database; the motion of a plan in the mode `planning` [B]."""
-SENSORS = "/gazebo/sensors"
-UNITS = ("B", "kB", "MB", "GB", "TB")
+SENSORS_PARAMETER = "/gazebo/sensors"
+SIZE_UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
 def disk_text(episodes: Sequence[EpisodeSpec]) -> str:
@@ -49,7 +49,7 @@ def size_text(size: float) -> str:
     """Returns a size [B] as text with two digits and a unit."""
     power = min(int(math.log10(max(size, 1.0)) // 3), 4)
     value = size / 1000**power
-    return f"{value:.0f} {UNITS[power]}" if value >= 10.0 else f"{value:.2g} {UNITS[power]}"
+    return f"{value:.0f} {SIZE_UNITS[power]}" if value >= 10.0 else f"{value:.2g} {SIZE_UNITS[power]}"
 
 
 def _sizes(settings: EpisodeSettings) -> Iterator[tuple[str, float]]:
@@ -76,8 +76,8 @@ def _task_sizes(settings: TaskSettings) -> Iterator[tuple[str, float]]:
 
 def _cameras(settings: TaskSettings) -> list[Camera]:
     """Returns the cameras of the launch's sensors_config.yaml, without cameras of models and robots."""
-    sensors = preview_stack(settings).preview.below(SENSORS)
-    return read_cameras(sensors, SENSORS, lambda frame: "world")[0]
+    sensors = preview_stack(settings).preview.below(SENSORS_PARAMETER)
+    return read_cameras(sensors, SENSORS_PARAMETER, lambda frame: "world")[0]
 
 
 def _image_bytes(camera: Camera) -> float:

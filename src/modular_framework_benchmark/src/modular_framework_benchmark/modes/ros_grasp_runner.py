@@ -51,7 +51,7 @@ ALLOWED_METHOD = "allowed: MODULE:CLASS of a grasp method, such as top_down_gras
 
 
 @dataclass(frozen=True, slots=True)
-class _Prepared:
+class _GraspSetup:
     """Data shared by episodes with the same robot and hand."""
 
     robot: Robot
@@ -59,13 +59,13 @@ class _Prepared:
     gripper: GripperGeometry
 
 
-class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _Prepared]):
+class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
     """Runs episodes of the mode `grasps`."""
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Generates and checks the grasps of one scene; writes no files."""
         settings = spec.settings_of(GraspSettings)
-        prepared = self.prepared(settings)
+        prepared = self.cached_setup(settings)
         scene = grasp_scene(prepared.robot.model, settings.objects, settings.target)
         method = load_method(settings.method, settings.method_parameters)
         started_s, start = watch.elapsed_s(), time.perf_counter()
@@ -78,21 +78,21 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _Prepared]):
             component="generation",
             name=settings.target,
             succeeded=bool(reachable),
-            reason=_reason(method, candidates, travels, outcome) + cause,
+            reason=_failure_reason(method, candidates, travels, outcome) + cause,
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
             figures=_figures(candidates, travels, reachable),
-            ran=_ran(settings.method_package, prepared),
+            ran=_used_software(settings.method_package, prepared),
         )
         status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report=report, folder=folder, watch=watch)
 
-    def prepared_by(self, settings: GraspSettings) -> tuple[Any, ...]:
+    def setup_key(self, settings: GraspSettings) -> tuple[Any, ...]:
         """Returns robot, group and gripper joint."""
         return settings.robot, settings.group, settings.gripper_joint
 
-    def prepare(self, settings: GraspSettings) -> _Prepared:
+    def prepare(self, settings: GraspSettings) -> _GraspSetup:
         """Returns the robot with its inverse kinematics and hand."""
         robot = self.robot(settings.robot)
         group = robot.chain(settings.group)
@@ -100,10 +100,10 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _Prepared]):
             gripper = measure_gripper(robot.urdf, group.tip_link, settings.gripper_joint)
         except GripperGeometryError as error:
             raise ModeError(f"gripper_joint '{settings.gripper_joint}': {error}") from error
-        return _Prepared(robot, robot.solvers().solver(group.name), gripper)
+        return _GraspSetup(robot, robot.solvers().solver(group.name), gripper)
 
 
-def _ran(package: str, prepared: _Prepared) -> UsedSoftware:
+def _used_software(package: str, prepared: _GraspSetup) -> UsedSoftware:
     version, sources = package_source(package)
     return UsedSoftware(
         methods={package: UsedMethod(version, sources)},
@@ -127,10 +127,10 @@ def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
     kind = method_class(reference)
     declared = node_declaration(*getattr(kind, "declared_in", ("", ""))) or NodeDeclaration()
     try:
-        made: GraspMethod = kind(GivenParameters(parameters, declared))
+        method: GraspMethod = kind(GivenParameters(parameters, declared))
     except TypeError as error:
         raise ModeError(f"method '{reference}' cannot be constructed ({error}); {ALLOWED_METHOD}") from error
-    return made
+    return method
 
 
 def method_class(reference: str) -> Any:
@@ -157,7 +157,7 @@ def _candidates(
     return merged, "" if merged else "".join(causes)
 
 
-def _joint_travels(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:
+def _joint_travels(prepared: _GraspSetup, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:
     """Returns the joint travel of each candidate; None if unreachable."""
     if not candidates:
         return []
@@ -173,7 +173,9 @@ def _figures(
     return figures | ({BEST_RANK: float(reachable[0])} if reachable else {})
 
 
-def _reason(method: GraspMethod, candidates: list[GraspCandidate], travels: list[float | None], outcome: str) -> str:
+def _failure_reason(
+    method: GraspMethod, candidates: list[GraspCandidate], travels: list[float | None], outcome: str
+) -> str:
     match outcome:
         case "reachable":
             return ""

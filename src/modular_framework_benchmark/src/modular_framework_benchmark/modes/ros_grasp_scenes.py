@@ -51,19 +51,19 @@ def grasp_scene(model: RobotModel, objects: Sequence[PlacedObject], target: str)
     """
     scene = empty_scene(model, model.default_positions())
     targets: list[SceneObject] = []
-    others: list[SceneObject] = []
+    other_objects: list[SceneObject] = []
     for item in objects:
         try:
             for message in _messages(item, model.planning_frame):
                 scene = apply_collision_object(scene, message)
                 part = scene_object(message)
                 if part is not None:
-                    (targets if item.name == target else others).append(part)
+                    (targets if item.name == target else other_objects).append(part)
         except (DescriptionError, SceneObjectError, PlanningError, OSError) as error:
             raise ModeError(f"object '{item.name}': {error}") from error
     if not targets:
         raise ModeError(f"object '{target}' has no graspable collision shape; choose another target")
-    return GraspScene(scene, tuple(targets), tuple(others))
+    return GraspScene(scene, tuple(targets), tuple(other_objects))
 
 
 def _messages(item: PlacedObject, frame: str) -> list[Any]:

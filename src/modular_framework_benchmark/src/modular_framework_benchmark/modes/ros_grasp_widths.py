@@ -65,11 +65,11 @@ def _opening(parameters: Mapping[str, Any], joint: str) -> float | None:
     """Returns the largest opening of the gripper [m]; None for a robot without a known gripper."""
     urdf, srdf = (str(parameters.get(f"/robot_description{end}", "")) for end in ("", "_semantic"))
     groups = str(parameters.get(ARM_GROUP, "")), str(parameters.get(HAND_GROUP, ""))
-    return _measured(urdf, srdf, *groups, joint)
+    return _measured_opening(urdf, srdf, *groups, joint)
 
 
 @lru_cache(maxsize=16)
-def _measured(urdf: str, srdf: str, arm: str, hand: str, joint: str) -> float | None:
+def _measured_opening(urdf: str, srdf: str, arm: str, hand: str, joint: str) -> float | None:
     try:
         tip = read_group(urdf, srdf, arm).tip_link
         return measure_gripper(urdf, tip, joint or driven_joint(urdf, srdf, hand)).max_opening

@@ -70,7 +70,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Solves the poses of a trial; writes no files."""
         settings = spec.settings_of(KinematicsSettings)
-        robot, solver = self.robot(settings.robot), self.prepared(settings)
+        robot, solver = self.robot(settings.robot), self.cached_setup(settings)
         started_s = watch.elapsed_s()
         results = _solve_poses(robot, solver, settings, spec.seed)
         unsolved, ended_s = [number for number, result in enumerate(results) if not result.is_solved], watch.elapsed_s()
@@ -96,7 +96,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
             spec, status, "unsolved" if unsolved else "solved", report=report, folder=folder, watch=watch
         )
 
-    def prepared_by(self, settings: KinematicsSettings) -> tuple[Any, ...]:
+    def setup_key(self, settings: KinematicsSettings) -> tuple[Any, ...]:
         """Returns the settings of the solver."""
         return settings.robot, settings.group, settings.solver, settings.timeout, settings.parameters
 
@@ -108,7 +108,9 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[KinematicsSettings, InverseKine
         solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
         if settings.solver == CLOSED_FORM and solver.method == NUMERIC:
             raise ModeError(f"solver '{CLOSED_FORM}': group '{group.name}' has no closed form; leave the key out")
-        solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
+        solver.solutions(
+            group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _default_positions(robot)
+        )
         return solver
 
 
@@ -125,27 +127,27 @@ def solver_parameters(parameters: Mapping[str, Any], group: str) -> dict[str, An
         ModeError: A parameter is not below the group's name in robot_description_kinematics.
         PlanningError: A value is not allowed.
     """
-    given = parameters_below(parameters, (f"/robot_description_kinematics/{group}/",))
-    settings_from({group: given})
-    return given
+    group_parameters = parameters_below(parameters, (f"/robot_description_kinematics/{group}/",))
+    settings_from({group: group_parameters})
+    return group_parameters
 
 
 def _solver_settings(robot: Robot, settings: KinematicsSettings) -> SolverSettings:
     group = settings.group
     result = robot.kinematics.get(group, SolverSettings())
-    given = solver_parameters(settings.parameters, group)
-    if given:
-        result = settings_from({group: {"kinematics_solver": result.solver, **given}})[group]
+    parameters = solver_parameters(settings.parameters, group)
+    if parameters:
+        result = settings_from({group: {"kinematics_solver": result.solver, **parameters}})[group]
     return replace(result, solver=settings.solver) if settings.solver else result
 
 
-def _home(robot: Robot) -> Array:
+def _default_positions(robot: Robot) -> Array:
     return robot.model.default_positions()
 
 
 def _reachable_pose(robot: Robot, group: JointGroup, generator: np.random.Generator) -> Transform:
     """Returns the pose of the tip at random joint values, within pi of zero."""
-    model, positions = robot.model, _home(robot)
+    model, positions = robot.model, _default_positions(robot)
     lower, upper = np.maximum(model.lower[group.indices], -np.pi), np.minimum(model.upper[group.indices], np.pi)
     positions[group.indices] = generator.uniform(lower, upper)
     return model.link_transforms(model.with_mimics(positions))[group.tip_link]
@@ -157,29 +159,31 @@ def _solve_poses(robot: Robot, solver: InverseKinematics, settings: KinematicsSe
     for _ in range(settings.poses):
         target = _reachable_pose(robot, solver.group, generator)
         start = time.perf_counter()
-        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s=settings.timeout)
-        results.append(_check_solution(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
+        solutions = solver.solutions(
+            solver.group.tip_link, target, _default_positions(robot), timeout_s=settings.timeout
+        )
+        results.append(_check_solution(robot, solver.group.tip_link, target, solutions, time.perf_counter() - start))
     return results
 
 
-def _check_solution(robot: Robot, tip: str, target: Transform, found: list[Array], time_s: float) -> _PoseResult:
+def _check_solution(robot: Robot, tip: str, target: Transform, solutions: list[Array], time_s: float) -> _PoseResult:
     """Returns the errors of the first solution, computed by forward kinematics.
 
     Args:
         robot: Robot.
         tip: Tip link.
         target: Target pose of the tip.
-        found: Solutions, each of shape (joints of the robot,).
+        solutions: Solutions, each of shape (joints of the robot,).
         time_s: Solving time [s].
     """
-    if not found:
+    if not solutions:
         return _PoseResult(time_s, 0, np.inf, np.inf)
-    reached = robot.model.link_transforms(found[0])[tip]
-    model, values = robot.model, found[0]
+    reached = robot.model.link_transforms(solutions[0])[tip]
+    model, values = robot.model, solutions[0]
     within_limits = bool(((values >= model.lower - 1e-9) & (values <= model.upper + 1e-9)).all())
     error = pin.log3(target.rotation.T @ reached.rotation)
     position_error = float(np.linalg.norm(reached.translation - target.translation)) if within_limits else np.inf
-    return _PoseResult(time_s, len(found), position_error, float(np.linalg.norm(error)))
+    return _PoseResult(time_s, len(solutions), position_error, float(np.linalg.norm(error)))
 
 
 def _figures(results: list[_PoseResult]) -> dict[Figure, float]:

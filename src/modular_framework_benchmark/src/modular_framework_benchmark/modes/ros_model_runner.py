@@ -17,16 +17,16 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_planning.errors import ModelError, PlanningError
 
-PreparedT = TypeVar("PreparedT")
+SetupT = TypeVar("SetupT")
 
 
-class ModelEpisodeRunner(abc.ABC, Generic[ModelSettingsT, PreparedT]):
+class ModelEpisodeRunner(abc.ABC, Generic[ModelSettingsT, SetupT]):
     """Runs episodes of a mode without simulation within a process."""
 
     def __init__(self) -> None:
         """Creates empty caches; robots are loaded on demand."""
         self._robots: dict[RobotSource, Robot] = {}
-        self._prepared: dict[str, PreparedT] = {}
+        self._prepared: dict[str, SetupT] = {}
 
     def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
         """Runs an episode.
@@ -57,19 +57,19 @@ class ModelEpisodeRunner(abc.ABC, Generic[ModelSettingsT, PreparedT]):
         """
 
     @abc.abstractmethod
-    def prepared_by(self, settings: ModelSettingsT) -> tuple[Any, ...]:
+    def setup_key(self, settings: ModelSettingsT) -> tuple[Any, ...]:
         """Returns the settings that `prepare` uses; episodes with equal values share its result."""
 
     @abc.abstractmethod
-    def prepare(self, settings: ModelSettingsT) -> PreparedT:
+    def prepare(self, settings: ModelSettingsT) -> SetupT:
         """Returns data that episodes share, such as a solver; raises like `measure`."""
 
-    def end(self, prepared: PreparedT) -> None:
+    def end(self, prepared: SetupT) -> None:
         """Releases the result of `prepare`; overridden by modes that start processes."""
 
-    def prepared(self, settings: ModelSettingsT) -> PreparedT:
+    def cached_setup(self, settings: ModelSettingsT) -> SetupT:
         """Returns the cached result of `prepare` for an episode's settings; raises like `measure`."""
-        key = json.dumps(as_json(self.prepared_by(settings)), sort_keys=True)
+        key = json.dumps(as_json(self.setup_key(settings)), sort_keys=True)
         if key not in self._prepared:
             self._prepared[key] = self.prepare(settings)
         return self._prepared[key]

@@ -12,8 +12,8 @@ from modular_framework_core.launching.ros_launch_preview import leaves
 from modular_framework_ros.allowed_names import nearest
 from modular_framework_ros.parameter_declarations import existing_declaration
 
-NODE = "/move_group/"
-NOT_READ = {"seed": "each episode has its own seed", "capabilities": "this mode starts no move_group"}
+NODE_NAMESPACE = "/move_group/"
+UNSUPPORTED_PARAMETERS = {"seed": "each episode has its own seed", "capabilities": "this mode starts no move_group"}
 """Parameters of a pipeline without effect in this mode, and the reason."""
 
 
@@ -27,16 +27,18 @@ def pipeline_parameters(parameters: Mapping[str, Any], pipeline: str) -> dict[st
     Raises:
         ModeError: The mode ignores some parameters, which the message lists.
     """
-    own, given = f"{NODE}planning_pipelines/{pipeline}/", leaves(parameters)
+    own, values = f"{NODE_NAMESPACE}planning_pipelines/{pipeline}/", leaves(parameters)
     declared = existing_declaration("modular_framework_planning", "planning_pipeline").parameters
-    read = [f"{parent}{key}" for parent in (own, NODE) for key in declared if key not in NOT_READ]
+    read = [
+        f"{parent}{key}" for parent in (own, NODE_NAMESPACE) for key in declared if key not in UNSUPPORTED_PARAMETERS
+    ]
     faults = []
-    for name in given:
-        key = name.removeprefix(own).removeprefix(NODE).partition("/")[0]
-        is_read = name.startswith(own) or (name.startswith(NODE) and key in declared)
-        if not is_read or key in NOT_READ:
-            reason = NOT_READ[key] if is_read else f"allowed: names below {own}{nearest(name, read)}"
+    for name in values:
+        key = name.removeprefix(own).removeprefix(NODE_NAMESPACE).partition("/")[0]
+        is_read = name.startswith(own) or (name.startswith(NODE_NAMESPACE) and key in declared)
+        if not is_read or key in UNSUPPORTED_PARAMETERS:
+            reason = UNSUPPORTED_PARAMETERS[key] if is_read else f"allowed: names below {own}{nearest(name, read)}"
             faults.append(f"parameter '{name}' has no effect in this mode; {reason}")
     if faults:
         raise ModeError("; ".join(faults))
-    return parameters_below(given, (NODE, own))
+    return parameters_below(values, (NODE_NAMESPACE, own))

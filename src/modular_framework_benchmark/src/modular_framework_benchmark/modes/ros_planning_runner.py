@@ -18,7 +18,7 @@ from modular_framework_benchmark.experiments.planning_mode import PlanningSettin
 from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
-from modular_framework_benchmark.modes.parameters import merged
+from modular_framework_benchmark.modes.parameters import merge_parameters
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
@@ -50,7 +50,7 @@ PLUGINS = {  # defaults for pipelines without a configuration
 
 
 @dataclass(frozen=True, slots=True)
-class _Prepared:
+class _PlanningSetup:
     """Data shared by episodes with the same robot and pipeline."""
 
     model: RobotModel
@@ -58,13 +58,13 @@ class _Prepared:
     seeded: SeededPlanning
 
 
-class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
+class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]):
     """Runs episodes of the mode `planning`."""
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Plans one problem and writes the motion to `trajectory.parquet` in the folder."""
         settings = spec.settings_of(PlanningSettings)
-        prepared = self.prepared(settings)
+        prepared = self.cached_setup(settings)
         problem = _read_problem(settings, prepared.model)
         started_s, response, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         statistics: PlanStatistics | None = None
@@ -88,15 +88,15 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
             figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
             | (_figures(problem, response, settings) if response is not None else {}),
             motion=_motion(response.trajectory) if response is not None else None,
-            ran=_ran(statistics, self.robot(settings.robot)),
+            ran=_used_software(statistics, self.robot(settings.robot)),
         )
         return measured_record(spec, _status(code), code.name, report=report, folder=folder, watch=watch)
 
-    def prepared_by(self, settings: PlanningSettings) -> tuple[Any, ...]:
+    def setup_key(self, settings: PlanningSettings) -> tuple[Any, ...]:
         """Returns the settings of the pipeline."""
         return settings.robot, settings.pipeline, settings.planner, settings.planner_parameters, settings.parameters
 
-    def prepare(self, settings: PlanningSettings) -> _Prepared:
+    def prepare(self, settings: PlanningSettings) -> _PlanningSetup:
         """Returns the robot and the started planning process, whose start is no part of a plan."""
         robot = self.robot(settings.robot)
         spec = _pipeline_spec(robot, settings)
@@ -104,9 +104,9 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _Prepared]):
         _check_planner(pipeline, settings.planner)
         seeded = SeededPlanning(robot.model, [spec])
         seeded.start()
-        return _Prepared(robot.model, pipeline, seeded)
+        return _PlanningSetup(robot.model, pipeline, seeded)
 
-    def end(self, prepared: _Prepared) -> None:
+    def end(self, prepared: _PlanningSetup) -> None:
         """Ends the planning process."""
         prepared.seeded.close()
 
@@ -119,23 +119,23 @@ def _pipeline_spec(robot: Robot, settings: PlanningSettings) -> PipelineSpec:
     name, planner = settings.pipeline or "ompl", settings.planner
     own = robot.pipelines.get(name) or {"planning_plugin": PLUGINS.get(name, name)}
     given = pipeline_parameters(settings.parameters, name)
-    parameters = merged({**own, **FULL_SPEED}, given)
+    parameters = merge_parameters({**own, **FULL_SPEED}, given)
     if settings.planner_parameters:
         configurations = {planner: {"type": f"geometric::{planner}"}}
-        configurations = merged(configurations, parameters.get("planner_configs") or {})
-        configurations = merged(configurations, {planner: settings.planner_parameters})
+        configurations = merge_parameters(configurations, parameters.get("planner_configs") or {})
+        configurations = merge_parameters(configurations, {planner: settings.planner_parameters})
         parameters["planner_configs"] = configurations
     return read_pipeline_spec(name, parameters, robot.planning, {})
 
 
 def _check_planner(pipeline: PlanningPipeline, planner: str) -> None:
     """Raises ModeError if move_group would replace the planner by its default."""
-    known = (*pipeline.planner_ids, *pipeline.configurations.names())
+    known_names = (*pipeline.planner_ids, *pipeline.configurations.names())
     if not planner:
         return  # the pipeline's default
-    if pipeline.planner_ids and planner not in known:
+    if pipeline.planner_ids and planner not in known_names:
         raise ModeError(
-            f"planner '{planner}': pipeline '{pipeline.name}' has no such planner; allowed: {', '.join(known)}"
+            f"planner '{planner}': pipeline '{pipeline.name}' has no such planner; allowed: {', '.join(known_names)}"
         )
     faults = pipeline.parameter_faults(planner)
     if faults:
@@ -157,7 +157,7 @@ def _read_problem(settings: PlanningSettings, model: RobotModel) -> MotionProble
     return MotionProblem(named.name, request)
 
 
-def _ran(statistics: PlanStatistics | None, robot: Robot) -> UsedSoftware:
+def _used_software(statistics: PlanStatistics | None, robot: Robot) -> UsedSoftware:
     run = None if statistics is None else statistics.run
     return UsedSoftware(digests=digests_of(robot)).with_plans([] if run is None else [run])
 

@@ -28,9 +28,9 @@ from modular_framework_benchmark.episodes.ros_file_digests import (
     world_files,
 )
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest, tree_files
-from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTIONS, MODEL_PATH, WORLD
+from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTION_PARAMETERS, MODEL_PATH, WORLD
 from modular_framework_benchmark.episodes.ros_stack_launch import StackPreview, preview_stack
-from modular_framework_benchmark.episodes.snapshot import PACKAGES
+from modular_framework_benchmark.episodes.snapshot import RECORDED_PACKAGES
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.metric_choices import metric_files
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
@@ -40,15 +40,15 @@ from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, model_file
-from modular_framework_benchmark.records.level_digests import FILE, combination_key, digests_text
+from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combination_key, digests_text
 
-FOLDERS = ("states_directory", "templates_directory")
+FOLDER_PARAMETERS = ("states_directory", "templates_directory")
 """Launch arguments that name folders of the user's code."""
-LIBRARIES = tuple(
+LIBRARY_PACKAGES = tuple(
     f"modular_framework_{name}"
     for name in ("benchmark", "control", "core", "planning", "ros", "simulation", "states", "urdf")
 )
-MAX_TEXT = 1024
+MAX_TEXT_LENGTH = 1024
 """Maximum length of a parameter that may name a file or package; longer parameters are documents."""
 
 Digests = Iterator[tuple[str, str]]
@@ -71,13 +71,13 @@ def run_digests(episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
         combinations.add(combination)
         for key, digests in _sources(spec.settings):
             sources.setdefault(key, (digests, set()))[1].add(combination)
-    found: dict[str, dict[str, set[str]]] = {}
+    digests_of_level: dict[str, dict[str, set[str]]] = {}
     for digests, users in sources.values():
         for description, digest in digests():
-            by_combination = found.setdefault(description, {key: set() for key in combinations})
+            by_combination = digests_of_level.setdefault(description, {key: set() for key in combinations})
             for key in users:
                 by_combination[key].add(digest[:16])
-    return {description: digests_text(digests) for description, digests in sorted(found.items())}
+    return {description: digests_text(digests) for description, digests in sorted(digests_of_level.items())}
 
 
 def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Digests]]]:
@@ -105,9 +105,9 @@ def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Dige
 
 
 def _library_digests() -> Digests:
-    for name in PACKAGES:
+    for name in RECORDED_PACKAGES:
         yield f"Python package {name}", _python_version(name)
-    for name in LIBRARIES:
+    for name in LIBRARY_PACKAGES:
         yield from _package_digests(name)
 
 
@@ -130,7 +130,7 @@ def _file_digests(file: Path, model_path: str) -> Digests:
 
 def _digests_of(files: Iterable[Path]) -> Digests:
     for file in files:
-        yield f"{FILE}{portable_name(file)}", file_digest(file)
+        yield f"{FILE_PREFIX}{portable_name(file)}", file_digest(file)
 
 
 def _robot_digests(source: RobotSource) -> Digests:
@@ -155,36 +155,36 @@ def _stack_digests(stack: StackPreview, changed: Mapping[str, Any]) -> Digests:
     parameters = stack.preview.with_parameters(changed).parameters
     texts = [
         *(node.arguments for node in stack.preview.nodes),
-        *(text for value in (stack.launch.arguments, *parameters.values()) for text in _texts(value)),
+        *(text for value in (stack.launch.arguments, *parameters.values()) for text in _path_texts(value)),
     ]
     resources = model_resources(str(parameters.get(MODEL_PATH, "")))
-    named = _Named()
+    named = _NamedContent()
     for text in texts:
         named.add(text)
     files = [path for file in named.files for path in files_with_named(file, resources)]
     files += [
         *world_files(str(parameters.get(WORLD, "")), resources),
-        *robot_files(str(parameters.get(DESCRIPTIONS[0], ""))),
+        *robot_files(str(parameters.get(DESCRIPTION_PARAMETERS[0], ""))),
     ]
     yield from _digests_of(dict.fromkeys(files))
     for package in {node.package for node in stack.preview.nodes} | named.packages:
         yield from _package_digests(package)
-    for name in FOLDERS:
+    for name in FOLDER_PARAMETERS:
         folders = [Path(entry) for entry in str(stack.launch.arguments.get(name, "")).split(os.pathsep) if entry]
         if folders:
             yield f"folder {name}", tree_digest([folder for folder in folders if folder.is_dir()])
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _path_texts(value: Any) -> Iterator[str]:
     """Yields the texts in a parameter that may name files or packages."""
     if isinstance(value, Mapping | list | tuple):
         for inner in value.values() if isinstance(value, Mapping) else value:
-            yield from _texts(inner)
-    elif isinstance(value, str) and len(value) < MAX_TEXT:
+            yield from _path_texts(inner)
+    elif isinstance(value, str) and len(value) < MAX_TEXT_LENGTH:
         yield value
 
 
-class _Named:
+class _NamedContent:
     """Files and packages that texts name.
 
     Attributes:
@@ -212,9 +212,9 @@ class _Named:
                 self._add_files(files_in_package(package, word))
 
     def _add_files(self, files: Iterable[Path]) -> bool:
-        found = dict.fromkeys(files)
-        self.files.update(found)
-        return bool(found)
+        new_files = dict.fromkeys(files)
+        self.files.update(new_files)
+        return bool(new_files)
 
 
 @functools.cache

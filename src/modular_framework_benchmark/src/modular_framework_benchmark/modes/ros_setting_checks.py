@@ -41,7 +41,7 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
-NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
+MOVE_GROUP_NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
 
 
 def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -> list[SettingFault]:
@@ -89,9 +89,9 @@ def check_kinematics(runner: KinematicsEpisodeRunner, read: ReadSettings[Kinemat
     if robot is not None and "group" not in read.unreadable:
         faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
     if robot is not None and not faults and not read.unreadable:
-        faults += _faults_of([(("group",), lambda: runner.prepared(settings))])
+        faults += _faults_of([(("group",), lambda: runner.cached_setup(settings))])
         if not faults:
-            return _checked_solver(runner.prepared(settings), settings)
+            return _checked_solver(runner.cached_setup(settings), settings)
     return CheckedSettings(tuple(faults), None)
 
 
@@ -125,9 +125,9 @@ def check_grasps(runner: GraspEpisodeRunner, read: ReadSettings[GraspSettings]) 
     if robot is not None and "gripper_joint" not in read.unreadable:
         faults += _faults_of([(("gripper_joint",), lambda: check_joint(robot))])
     if robot is not None and not faults and not read.unreadable:
-        faults += _faults_of([(("gripper_joint",), lambda: runner.prepared(settings))])
+        faults += _faults_of([(("gripper_joint",), lambda: runner.cached_setup(settings))])
         if not faults:
-            named = runner.prepared(settings).solver.settings.solver
+            named = runner.cached_setup(settings).solver.settings.solver
             return CheckedSettings((), as_json(settings), solver_substitutions([named]))
     return CheckedSettings(tuple(faults), None)
 
@@ -187,11 +187,11 @@ def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSet
         return CheckedSettings(tuple(faults), None)
     check = _launch_check(robot, settings)
     faults += _parameter_faults(check, settings)
-    found = None
+    planner = None
     if "planner" not in read.unreadable:
-        found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
-    resolved = as_json(replace(settings, planner=repr(found)))
-    return CheckedSettings(tuple(faults), resolved, _substitutions(check.registry(), found))
+        planner = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
+    resolved = as_json(replace(settings, planner=repr(planner)))
+    return CheckedSettings(tuple(faults), resolved, _substitutions(check.registry(), planner))
 
 
 def _launch_check(robot: Robot, settings: PlanningSettings) -> LaunchCheck:
@@ -199,29 +199,31 @@ def _launch_check(robot: Robot, settings: PlanningSettings) -> LaunchCheck:
     pipeline = settings.pipeline
     pipelines = {**robot.pipelines}
     pipelines.setdefault(pipeline, {"planning_plugin": PLUGINS.get(pipeline, pipeline)})
-    parameters = leaves({f"{NODE.name}/planning_pipelines": pipelines, "/robot_description_planning": robot.planning})
+    parameters = leaves(
+        {f"{MOVE_GROUP_NODE.name}/planning_pipelines": pipelines, "/robot_description_planning": robot.planning}
+    )
     urdf, srdf = robot.model.source[:2]
     parameters |= {"/robot_description": urdf, "/robot_description_semantic": srdf}
-    parameters[f"{NODE.name}/default_planning_pipeline"] = pipeline
-    return LaunchCheck(LaunchPreview((NODE,), parameters), settings.parameters)
+    parameters[f"{MOVE_GROUP_NODE.name}/default_planning_pipeline"] = pipeline
+    return LaunchCheck(LaunchPreview((MOVE_GROUP_NODE,), parameters), settings.parameters)
 
 
 def _parameter_faults(check: LaunchCheck, settings: PlanningSettings) -> Iterator[SettingFault]:
     """Yields the errors in the parameters of the mode `planning`, including those of its pipeline."""
-    given = leaves(settings.parameters)
+    values = leaves(settings.parameters)
     pipeline, unread = settings.pipeline, set()
-    for name, value in given.items():
+    for name, value in values.items():
         try:
             pipeline_parameters({name: value}, pipeline)
         except ModeError as error:
             unread.add(name)
             yield SettingFault(("parameters", name), str(error))
-    plugin = f"{NODE.name}/planning_pipelines/{pipeline}/planning_plugin"
-    for found in check.faults():
-        if found.name not in unread and (
-            found.name != plugin or plugin in given
+    plugin = f"{MOVE_GROUP_NODE.name}/planning_pipelines/{pipeline}/planning_plugin"
+    for fault in check.faults():
+        if fault.name not in unread and (
+            fault.name != plugin or plugin in values
         ):  # otherwise the pipeline's name is wrong
-            yield SettingFault(("parameters", found.name), found.text)
+            yield SettingFault(("parameters", fault.name), fault.text)
 
 
 def _planner(
@@ -238,7 +240,7 @@ def _planner(
     try:
         registry = check.registry()
         assert registry is not None
-        found = registry.resolve(settings.planner, settings.group, settings.pipeline)
+        planner = registry.resolve(settings.planner, settings.group, settings.pipeline)
     except UnknownNameError as error:
         hint = f"{listing(error.known)}{nearest(error.name, error.known)}"
         faults.append(SettingFault((error.what,), f"there is no {error.what} '{error.name}'; {hint}"))
@@ -248,12 +250,12 @@ def _planner(
         text = f"there is no pipeline '{name}'; {listing(pipelines)}, or module/Class{nearest(name, pipelines)}"
         faults.append(SettingFault(("pipeline",), text))
         return None
-    faults.extend(_setting_faults(check, found, settings))
-    return found
+    faults.extend(_setting_faults(check, planner, settings))
+    return planner
 
 
-def _setting_faults(check: LaunchCheck, found: ResolvedPlanner, settings: PlanningSettings) -> Iterator[SettingFault]:
+def _setting_faults(check: LaunchCheck, planner: ResolvedPlanner, settings: PlanningSettings) -> Iterator[SettingFault]:
     for key, value in settings.planner_parameters.items():
         registry = check.registry()
-        for text in registry.faults(found, {key: value}) if registry is not None else ():
+        for text in registry.faults(planner, {key: value}) if registry is not None else ():
             yield SettingFault(("planner_parameters", key), text.replace("; it is ignored", ""))

@@ -96,11 +96,11 @@ class Lifted(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is more than {self.height:g} m higher than at the start"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the object is higher than wanted, shape (n,)."""
         return self._heights(world) > self.height
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the height above the start."""
         return f"'{self.object}' is {self._heights(world)[-1]:.3f} m higher (wanted: more than {self.height:g} m)"
 
@@ -118,11 +118,11 @@ class HeldFor(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is in the gripper"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether a gripper holds the object, shape (n,)."""
         return world.holds(self.object)
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns whether a gripper holds the object."""
         return f"'{self.object}' is {'' if world.holds(self.object)[-1] else 'not '}in the gripper"
 
@@ -142,11 +142,11 @@ class InRegion(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is in the region '{self.region.name}'"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the centre is in the region, shape (n,)."""
         return self.region.contains(world.bodies[self.object].centres)
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the position of the centre."""
         x, y, z = world.bodies[self.object].centres[-1]
         return f"'{self.object}' is at ({x:.3f}, {y:.3f}, {z:.3f}) m (wanted: in the region '{self.region.name}')"
@@ -177,12 +177,12 @@ class OnTopOf(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' lies on '{self.support}'"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the object lies on the support, shape (n,)."""
         touching, level = world.touches(self.object, self.support), np.abs(self._gaps(world)) <= self.tolerance
         return touching & level & _is_above(world.bodies[self.object].centres, world.bodies[self.support])
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the contact and the gap between object and support."""
         touch = "touches" if world.touches(self.object, self.support)[-1] else "does not touch"
         gap = f"its bottom is {self._gaps(world)[-1]:.3f} m above the top of '{self.support}'"
@@ -235,11 +235,11 @@ class Inside(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is inside '{self.container}'"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether all corners are inside, shape (n,)."""
         return self._excess(world) <= self.tolerance
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the distance by which corners leave the container's box."""
         excess = f"leaves the box of '{self.container}' by {max(self._excess(world)[-1], 0.0):.3f} m"
         return f"'{self.object}' {excess} (wanted: at most {self.tolerance:g} m)"
@@ -265,11 +265,11 @@ class Upright(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' stands upright"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the axis points up, shape (n,)."""
         return self._angles(world) <= self.angle
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the angle to the vertical."""
         return f"'{self.object}' is tilted by {self._angles(world)[-1]:.3f} rad (wanted: at most {self.angle:g} rad)"
 
@@ -291,23 +291,23 @@ class PoseCondition(ObjectCondition):
     distance: float = number(0.01, high=10.0)
     angle: float = number(0.1, high=3.1416)
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the object is within both tolerances, shape (n,)."""
         distances, angles = self._errors(world)
         return (distances <= self.distance) & (angles <= self.angle)
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the distance and the angle from the pose."""
         distances, angles = self._errors(world)
-        wanted = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
-        return f"{self._found(f'{distances[-1]:.3f} m', f'{angles[-1]:.3f} rad')} ({wanted})"
+        wanted_text = f"wanted: at most {self.distance:g} m and {self.angle:g} rad"
+        return f"{self._deviation_text(f'{distances[-1]:.3f} m', f'{angles[-1]:.3f} rad')} ({wanted_text})"
 
     @abstractmethod
     def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
         """Returns the distances [m] and the angles [rad] from the pose, each of shape (n,)."""
 
     @abstractmethod
-    def _found(self, distance: str, angle: str) -> str:
+    def _deviation_text(self, distance: str, angle: str) -> str:
         """Returns a description of the measured distance and angle."""
 
 
@@ -335,7 +335,7 @@ class Aligned(PoseCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is at {self.position} m, {self.rpy} rad of '{self.relative_to}'"
 
-    def _found(self, distance: str, angle: str) -> str:
+    def _deviation_text(self, distance: str, angle: str) -> str:
         return f"'{self.object}' is {distance} and {angle} from its pose"
 
     def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
@@ -376,12 +376,12 @@ class JointAtLeast(Condition):
         """Returns a description of the condition."""
         return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the joint is at the position or beyond, shape (n,); never for an unknown joint."""
         positions = world.bodies[self.model].joints.get(self.joint)
         return np.zeros(len(world.times_s), dtype=bool) if positions is None else positions >= self.position
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the position of the joint, or the joints of the model."""
         joints = world.bodies[self.model].joints
         if self.joint not in joints:
@@ -412,14 +412,14 @@ class Cleared(Condition):
         """Returns a description of the condition."""
         return f"none of {', '.join(self.objects)} is in the region '{self.region.name}'"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether all objects are outside, shape (n,)."""
         return ~np.logical_or.reduce([self.region.contains(world.bodies[each].centres) for each in self.objects])
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the objects in the region."""
-        left = [each for each in self.objects if self.region.contains(world.bodies[each].centres)[-1]]
-        return f"{', '.join(left) or 'nothing'} is in the region '{self.region.name}' (wanted: nothing)"
+        objects_inside = [each for each in self.objects if self.region.contains(world.bodies[each].centres)[-1]]
+        return f"{', '.join(objects_inside) or 'nothing'} is in the region '{self.region.name}' (wanted: nothing)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -431,7 +431,7 @@ class NotMoved(PoseCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' is where it was at the start"
 
-    def _found(self, distance: str, angle: str) -> str:
+    def _deviation_text(self, distance: str, angle: str) -> str:
         return f"'{self.object}' has moved by {distance} and {angle}"
 
     def _errors(self, world: WorldTrack) -> tuple[Floats, Floats]:
@@ -460,12 +460,12 @@ class NoContact(ObjectCondition):
         """Returns a description of the condition."""
         return f"'{self.object}' does not touch '{self.other}'"
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the models do not touch, shape (n,)."""
         exists = ~np.isnan(world.bodies[self.object].positions[:, 0])
         return exists & ~world.touches(self.object, self.other)
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns whether the models touch."""
         touch = "touches" if world.touches(self.object, self.other)[-1] else "does not touch"
         return f"'{self.object}' {touch} '{self.other}' (wanted: no contact)"
@@ -499,14 +499,14 @@ class Stacked(Condition):
         neighbours = zip(self.objects, self.objects[1:], strict=False)
         return tuple(OnTopOf(object=upper, support=lower, tolerance=self.tolerance) for lower, upper in neighbours)
 
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether all pairs lie on each other, shape (n,)."""
-        return np.logical_and.reduce([pair.within(world) for pair in self.pairs])
+        return np.logical_and.reduce([pair.satisfied_in(world) for pair in self.pairs])
 
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the lowest pair that does not lie on each other."""
-        wrong = [pair for pair in self.pairs if not pair.within(world)[-1]]
-        return wrong[0].measured(world) if wrong else self.statement
+        wrong = [pair for pair in self.pairs if not pair.satisfied_in(world)[-1]]
+        return wrong[0].measurement_text(world) if wrong else self.statement
 
 
 CONDITIONS: dict[str, type[Condition]] = {

@@ -26,14 +26,14 @@ from modular_framework_benchmark.predicates.world_track import ROBOT
 
 def contradiction(predicate: Predicate) -> str:
     """Returns two statements that cannot hold at the same time although the predicate needs both; "" for none."""
-    needed = list(dict.fromkeys(_needed(predicate)))
-    for one in needed:
-        names = one.names if isinstance(one, Condition) else ()
+    required = list(dict.fromkeys(_required_statements(predicate)))
+    for first in required:
+        names = first.names if isinstance(first, Condition) else ()
         if len(set(names)) < len(names):
-            return f"{_words(one)} names '{max(names, key=names.count)}' twice"
-    for one, other in combinations(needed, 2):
-        if _excludes(one, other) or _excludes(other, one):
-            return f"{_words(one)}, but {_words(other)}"
+            return f"{_statement_text(first)} names '{max(names, key=names.count)}' twice"
+    for first, second in combinations(required, 2):
+        if _excludes(first, second) or _excludes(second, first):
+            return f"{_statement_text(first)}, but {_statement_text(second)}"
     return ""
 
 
@@ -52,12 +52,12 @@ def repetition(milestones: Sequence[Milestone]) -> tuple[int, str]:
     return -1, ""
 
 
-def _needed(predicate: Predicate) -> Iterator[Predicate]:
+def _required_statements(predicate: Predicate) -> Iterator[Predicate]:
     """Yields the conditions and negations that must hold together for a predicate to hold."""
     match predicate:
         case All():
             for part in predicate.parts:
-                yield from _needed(part)
+                yield from _required_statements(part)
         case Stacked():
             yield predicate
             yield from predicate.pairs
@@ -65,42 +65,44 @@ def _needed(predicate: Predicate) -> Iterator[Predicate]:
             yield predicate
 
 
-def _words(predicate: Predicate) -> str:
+def _statement_text(predicate: Predicate) -> str:
     statements = " and ".join(condition.statement for condition in predicate.conditions)
     return f"not: {statements}" if isinstance(predicate, Not) else statements
 
 
-def _excludes(one: Predicate, other: Predicate) -> bool:
+def _excludes(first: Predicate, second: Predicate) -> bool:
     """Returns whether one statement makes another impossible; checked in both orders by the caller."""
-    match one, other:
+    match first, second:
         case Condition(), Not(part=Condition() as part):
-            return _implies(one, part)
+            return _implies(first, part)
         case InRegion(), InRegion():
-            return one.object == other.object and one.region.is_apart_from(other.region)
+            return first.object == second.object and first.region.is_apart_from(second.region)
         case InRegion(), Cleared():
-            return one.object in other.objects and one.region == other.region
+            return first.object in second.objects and first.region == second.region
         case Lifted(), NotMoved():
-            return one.object == other.object and one.height >= other.distance
+            return first.object == second.object and first.height >= second.distance
         case HeldFor(), NoContact():
-            return one.object == other.object and other.other == ROBOT
+            return first.object == second.object and second.other == ROBOT
         case OnTopOf(), NoContact():
-            return {one.object, one.support} == {other.object, other.other}
+            return {first.object, first.support} == {second.object, second.other}
         case OnTopOf(), OnTopOf():
-            return (one.object, one.support) == (other.support, other.object)
+            return (first.object, first.support) == (second.support, second.object)
         case Inside(), Inside():
-            return (one.object, one.container) == (other.container, other.object)
+            return (first.object, first.container) == (second.container, second.object)
     return False
 
 
-def _implies(one: Predicate, other: Predicate) -> bool:
+def _implies(first: Predicate, second: Predicate) -> bool:
     """Returns whether a predicate holds whenever another predicate of the same kind holds, or is the same."""
-    if type(one) is not type(other):
+    if type(first) is not type(second):
         return False
-    match one, other:
-        case (Lifted(), Lifted()) if one.height >= other.height and one.duration >= other.duration:
-            return replace(one, height=other.height, duration=other.duration) == other
-        case (JointAtLeast(), JointAtLeast()) if one.position >= other.position and one.duration >= other.duration:
-            return replace(one, position=other.position, duration=other.duration) == other
-        case (Condition(), Condition()) if one.duration >= other.duration:
-            return replace(one, duration=other.duration) == other
-    return one == other
+    match first, second:
+        case (Lifted(), Lifted()) if first.height >= second.height and first.duration >= second.duration:
+            return replace(first, height=second.height, duration=second.duration) == second
+        case (JointAtLeast(), JointAtLeast()) if (
+            first.position >= second.position and first.duration >= second.duration
+        ):
+            return replace(first, position=second.position, duration=second.duration) == second
+        case (Condition(), Condition()) if first.duration >= second.duration:
+            return replace(first, duration=second.duration) == second
+    return first == second

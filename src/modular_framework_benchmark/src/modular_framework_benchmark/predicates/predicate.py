@@ -21,10 +21,10 @@ class Stage(Protocol):
     def times_s(self) -> Floats:
         """Returns the moments at which the world is known, shape (n,) [s since the start of the recording]."""
 
-    def satisfied(self, condition: Condition) -> Flags:
+    def satisfied_flags(self, condition: Condition) -> Flags:
         """Returns whether a condition is satisfied at each moment, without its duration, shape (n,)."""
 
-    def found(self, condition: Condition) -> str:
+    def measurement_text(self, condition: Condition) -> str:
         """Returns the last measured value, in contrast to the required value."""
 
 
@@ -34,11 +34,11 @@ class Predicate(Tagged, ABC):
     __slots__ = ()
 
     @abstractmethod
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether the predicate holds at each moment of a stage, shape (n,)."""
 
     @abstractmethod
-    def explained(self, stage: Stage) -> tuple[str, ...]:
+    def failure_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns why the predicate does not hold at the last moment of a stage."""
 
     @property
@@ -46,9 +46,9 @@ class Predicate(Tagged, ABC):
     def conditions(self) -> tuple[Condition, ...]:
         """Returns the conditions on which the predicate depends."""
 
-    def unmet(self, stage: Stage) -> tuple[str, ...]:
+    def unmet_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns why the predicate does not hold at the last moment of a stage; empty if it holds."""
-        return () if self.over(stage)[-1:].any() else self.explained(stage)
+        return () if self.truth_over(stage)[-1:].any() else self.failure_reasons(stage)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +66,14 @@ class Condition(Predicate):
         """Returns this condition."""
         return (self,)
 
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether the condition has been satisfied for its duration at each moment of a stage, shape (n,)."""
-        return sustained(stage.satisfied(self), stage.times_s, self.duration)
+        return sustained_flags(stage.satisfied_flags(self), stage.times_s, self.duration)
 
-    def explained(self, stage: Stage) -> tuple[str, ...]:
+    def failure_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns what was found at the last moment of a stage."""
-        is_short = stage.satisfied(self)[-1:].any()
-        return (stage.found(self) + (f" for less than {self.duration:g} s" if is_short else ""),)
+        is_short = stage.satisfied_flags(self)[-1:].any()
+        return (stage.measurement_text(self) + (f" for less than {self.duration:g} s" if is_short else ""),)
 
     @property
     @abstractmethod
@@ -86,15 +86,15 @@ class Condition(Predicate):
         """Returns a description of the condition that an operator confirms or denies."""
 
     @abstractmethod
-    def within(self, world: WorldTrack) -> Flags:
+    def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the condition is satisfied at each moment of the true state, shape (n,)."""
 
     @abstractmethod
-    def measured(self, world: WorldTrack) -> str:
+    def measurement_text(self, world: WorldTrack) -> str:
         """Returns the measured value at the last moment of the true state, with the required value."""
 
 
-def sustained(satisfied: Flags, times_s: Floats, duration_s: float) -> Flags:
+def sustained_flags(satisfied: Flags, times_s: Floats, duration_s: float) -> Flags:
     """Returns whether a condition has been satisfied for a duration at each moment, shape (n,).
 
     Args:
@@ -122,9 +122,9 @@ class Combination(Predicate):
         """Returns the conditions of all parts."""
         return tuple(condition for part in self.parts for condition in part.conditions)
 
-    def explained(self, stage: Stage) -> tuple[str, ...]:
+    def failure_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns why parts do not hold at the last moment of a stage."""
-        return tuple(text for part in self.parts for text in part.unmet(stage))
+        return tuple(text for part in self.parts for text in part.unmet_reasons(stage))
 
 
 class All(Combination):
@@ -132,9 +132,9 @@ class All(Combination):
 
     __slots__ = ()
 
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether all parts hold at each moment of a stage, shape (n,)."""
-        return np.logical_and.reduce([part.over(stage) for part in self.parts])
+        return np.logical_and.reduce([part.truth_over(stage) for part in self.parts])
 
 
 class Any(Combination):
@@ -142,9 +142,9 @@ class Any(Combination):
 
     __slots__ = ()
 
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether a part holds at each moment of a stage, shape (n,)."""
-        return np.logical_or.reduce([part.over(stage) for part in self.parts])
+        return np.logical_or.reduce([part.truth_over(stage) for part in self.parts])
 
 
 class InOrder(Combination):
@@ -152,17 +152,19 @@ class InOrder(Combination):
 
     __slots__ = ()
 
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether the parts have held one after the other at each moment of a stage, shape (n,)."""
         reached = np.ones(len(stage.times_s), dtype=bool)
         for part in self.parts:
-            reached = np.logical_or.accumulate(part.over(stage) & reached)
+            reached = np.logical_or.accumulate(part.truth_over(stage) & reached)
         return reached
 
-    def explained(self, stage: Stage) -> tuple[str, ...]:
+    def failure_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns the first part that did not hold after the parts before it."""
-        missed = next(n for n in range(len(self.parts)) if not InOrder(self.parts[: n + 1]).over(stage)[-1:].any())
-        statements = " and ".join(condition.statement for condition in self.parts[missed].conditions)
+        first_missed = next(
+            n for n in range(len(self.parts)) if not InOrder(self.parts[: n + 1]).truth_over(stage)[-1:].any()
+        )
+        statements = " and ".join(condition.statement for condition in self.parts[first_missed].conditions)
         return (f"it never happened in the given order that {statements}",)
 
 
@@ -181,10 +183,10 @@ class Not(Predicate):
         """Returns the conditions of the part."""
         return self.part.conditions
 
-    def over(self, stage: Stage) -> Flags:
+    def truth_over(self, stage: Stage) -> Flags:
         """Returns whether the part does not hold at each moment of a stage, shape (n,)."""
-        return ~self.part.over(stage)
+        return ~self.part.truth_over(stage)
 
-    def explained(self, stage: Stage) -> tuple[str, ...]:
+    def failure_reasons(self, stage: Stage) -> tuple[str, ...]:
         """Returns the conditions that must not hold."""
         return (f"{' and '.join(each.statement for each in self.conditions)}, which must not hold",)

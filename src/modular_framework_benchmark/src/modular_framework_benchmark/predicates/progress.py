@@ -47,10 +47,10 @@ class Progress:
         return sum(weights[: len(self.times_s)]) / sum(weights)
 
     @property
-    def missed(self) -> str:
+    def first_missed(self) -> str:
         """Returns the name of the first milestone that was not reached; "" if all were reached."""
-        left = self.milestones[len(self.times_s) :]
-        return left[0].name if left else ""
+        missed_milestones = self.milestones[len(self.times_s) :]
+        return missed_milestones[0].name if missed_milestones else ""
 
 
 def progress_of(milestones: Sequence[Milestone], stage: Stage) -> Progress:
@@ -63,7 +63,7 @@ def progress_of(milestones: Sequence[Milestone], stage: Stage) -> Progress:
     moments: list[float] = []
     first = 0
     for milestone in milestones:
-        reached = np.flatnonzero(milestone.predicate.over(stage)[first:])
+        reached = np.flatnonzero(milestone.predicate.truth_over(stage)[first:])
         if not len(reached):
             break
         first += int(reached[0])

@@ -27,16 +27,16 @@ class SimulatedStage:
         """Returns the moments of the states, shape (n,) [s since the start of the recording]."""
         return self.world.times_s
 
-    def satisfied(self, condition: Condition) -> Flags:
+    def satisfied_flags(self, condition: Condition) -> Flags:
         """Returns whether a condition is satisfied at each moment, shape (n,); never if a model does not exist."""
         if any(name not in self.world.bodies for name in condition.names):
             return np.zeros(len(self.times_s), dtype=bool)
-        return condition.within(self.world)
+        return condition.satisfied_in(self.world)
 
-    def found(self, condition: Condition) -> str:
+    def measurement_text(self, condition: Condition) -> str:
         """Returns the measured value at the last moment."""
         missing = [name for name in condition.names if name not in self.world.bodies]
-        return f"there is no '{missing[0]}' in the world" if missing else condition.measured(self.world)
+        return f"there is no '{missing[0]}' in the world" if missing else condition.measurement_text(self.world)
 
 
 class OperatorStage:
@@ -67,10 +67,10 @@ class OperatorStage:
         """Returns the times of the operator's answers, shape (n,) [s since the start of the recording]."""
         return np.array(self._times_s)
 
-    def satisfied(self, condition: Condition) -> Flags:
+    def satisfied_flags(self, condition: Condition) -> Flags:
         """Returns the operator's answers, shape (n,); false if the operator was not asked."""
         return np.array([answers.get(condition, False) for answers in self._answers], dtype=bool)
 
-    def found(self, condition: Condition) -> str:
+    def measurement_text(self, condition: Condition) -> str:
         """Returns the statement that the operator denied."""
         return f"the operator denies that {condition.statement}"

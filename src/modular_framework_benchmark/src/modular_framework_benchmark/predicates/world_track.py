@@ -46,8 +46,8 @@ class BodyTrack:
     @property
     def rotations(self) -> Rotation:
         """Returns the orientations; the identity while the model does not exist."""
-        known = ~np.isnan(self.quaternions[:, :1])
-        return Rotation.from_quat(np.where(known, self.quaternions, (0.0, 0.0, 0.0, 1.0)))
+        is_known = ~np.isnan(self.quaternions[:, :1])
+        return Rotation.from_quat(np.where(is_known, self.quaternions, (0.0, 0.0, 0.0, 1.0)))
 
     @property
     def centres(self) -> Floats:
@@ -91,8 +91,8 @@ class WorldTrack:
     def touches(self, name: str, other: str) -> Flags:
         """Returns whether two models press on each other, shape (n,); `ROBOT` stands for any robot."""
         sides = [self.robots if each == ROBOT else {each} for each in (name, other)]
-        found = [self.contacts.get(frozenset(pair), self._never) for pair in product(*sides)]
-        return np.logical_or.reduce([self._never, *found])
+        contacts = [self.contacts.get(frozenset(pair), self._never) for pair in product(*sides)]
+        return np.logical_or.reduce([self._never, *contacts])
 
     def holds(self, name: str) -> Flags:
         """Returns whether a gripper holds an object, shape (n,)."""
@@ -115,13 +115,13 @@ def read_world(record: Mapping[str, Any], origin_s: float, started_s: float, end
     samples = record["samples"]
     times_s = np.array([sample[0] for sample in samples], dtype=float) - origin_s
     first = max(int(np.searchsorted(times_s, started_s + TIME_TOLERANCE_S, "right")) - 1, 0)
-    kept = slice(first, int(np.searchsorted(times_s, ended_s + TIME_TOLERANCE_S, "right")))
+    episode_rows = slice(first, int(np.searchsorted(times_s, ended_s + TIME_TOLERANCE_S, "right")))
     names = sorted({name for sample in samples for name in sample[1]})
     return WorldTrack(
-        times_s=times_s[kept],
-        bodies={name: _body(samples, name, record["boxes"].get(name), kept) for name in names},
-        contacts=_members([[frozenset(pair) for pair in each] for each in _filled(samples, 2)], kept),
-        held=_members(list(_filled(samples, 3)), kept),
+        times_s=times_s[episode_rows],
+        bodies={name: _body(samples, name, record["boxes"].get(name), episode_rows) for name in names},
+        contacts=_members([[frozenset(pair) for pair in each] for each in _filled_column(samples, 2)], episode_rows),
+        held=_members(list(_filled_column(samples, 3)), episode_rows),
         robots=frozenset(record["robots"]),
     )
 
@@ -148,7 +148,7 @@ def _body(samples: Sequence[Any], name: str, box: Any, kept: slice) -> BodyTrack
     )
 
 
-def _filled(samples: Sequence[Any], column: int) -> Iterator[Any]:
+def _filled_column(samples: Sequence[Any], column: int) -> Iterator[Any]:
     """Yields the lists of a column, each repeated while it is unchanged."""
     present: Any = []
     for sample in samples:
@@ -156,7 +156,7 @@ def _filled(samples: Sequence[Any], column: int) -> Iterator[Any]:
         yield present
 
 
-def _members(lists: Sequence[Sequence[Any]], kept: slice) -> dict[Any, Flags]:
+def _members(lists: Sequence[Sequence[Any]], rows: slice) -> dict[Any, Flags]:
     """Returns whether each member is in each list, keyed by member."""
     members = {member for each in lists for member in each}
-    return {member: np.array([member in each for each in lists], dtype=bool)[kept] for member in members}
+    return {member: np.array([member in each for each in lists], dtype=bool)[rows] for member in members}

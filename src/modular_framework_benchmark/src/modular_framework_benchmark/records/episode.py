@@ -47,8 +47,10 @@ class EpisodeSpec:
         """
         if isinstance(self.settings, kind):
             return self.settings
-        found = type(self.settings).__name__
-        raise SettingsError(f"episode {self.key!r} has {found}; allowed: {kind.__name__}; use the runner of its mode")
+        found_type = type(self.settings).__name__
+        raise SettingsError(
+            f"episode {self.key!r} has {found_type}; allowed: {kind.__name__}; use the runner of its mode"
+        )
 
 
 class EpisodeStatus(Enum):

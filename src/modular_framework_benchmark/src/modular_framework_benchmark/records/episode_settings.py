@@ -99,7 +99,7 @@ class EpisodeSettings:
     @property
     def metric_names(self) -> tuple[str, ...]:
         """Returns the names of the metrics."""
-        return tuple(one if isinstance(one, str) else one.name for one in self.metrics)
+        return tuple(metric if isinstance(metric, str) else metric.name for metric in self.metrics)
 
     @property
     def budget_s(self) -> float | None:
@@ -141,15 +141,15 @@ class Tagged:
 
     def __init_subclass__(cls) -> None:
         """Registers the class."""
-        Tagged.kinds[_underscored(cls.__name__)] = cls
+        Tagged.kinds[_snake_case_name(cls.__name__)] = cls
 
     @property
     def kind(self) -> str:
         """Returns the name of the class with underscores."""
-        return _underscored(type(self).__name__)
+        return _snake_case_name(type(self).__name__)
 
 
-def _underscored(name: str) -> str:
+def _snake_case_name(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
@@ -188,18 +188,18 @@ def from_json(kind: Callable[..., _T], content: Mapping[str, Any]) -> _T:
         TypeError: A required field is missing.
     """
     hints = _hints(kind)
-    return kind(**{name: _decoded(hints[name], value) for name, value in content.items() if name in hints})
+    return kind(**{name: _decode_value(hints[name], value) for name, value in content.items() if name in hints})
 
 
 _hints = lru_cache(get_type_hints)
 
 
-def _decoded(hint: Any, value: Any) -> Any:
+def _decode_value(hint: Any, value: Any) -> Any:
     if isinstance(value, list):
-        return tuple(_decoded(get_args(hint)[0], part) for part in value)
-    hints = [one for one in (hint, *get_args(hint)) if isinstance(one, type)]
-    if isinstance(value, Mapping) and any(issubclass(one, Tagged) for one in hints):
+        return tuple(_decode_value(get_args(hint)[0], part) for part in value)
+    hints = [item for item in (hint, *get_args(hint)) if isinstance(item, type)]
+    if isinstance(value, Mapping) and any(issubclass(item, Tagged) for item in hints):
         ((name, content),) = value.items()
         return from_json(Tagged.kinds[name], content)
-    kind = next((one for one in hints if is_dataclass(one)), None)
+    kind = next((item for item in hints if is_dataclass(item)), None)
     return from_json(kind, value) if isinstance(value, Mapping) and kind is not None else value

@@ -13,9 +13,9 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from functools import lru_cache
 
-ABSENT = "-"
+ABSENT_DIGEST = "-"
 """Digest of content that a combination does not use."""
-FILE = "file "
+FILE_PREFIX = "file "
 """First word of the description of a file; a combination may use more files as its trials draw more problems."""
 
 
@@ -30,7 +30,7 @@ def digests_text(digests: Mapping[str, Collection[str]]) -> str:
     Args:
         digests: Digests by combination; none for a combination that does not use the content.
     """
-    texts = {key: " ".join(sorted(found)) or ABSENT for key, found in digests.items()}
+    texts = {key: " ".join(sorted(level_digests)) or ABSENT_DIGEST for key, level_digests in digests.items()}
     counts = Counter(texts.values())
     usual = max(sorted(counts), key=lambda text: counts[text])
     others = [f"{digest}@{key}" for key in sorted(texts) if texts[key] != usual for digest in texts[key].split()]
@@ -38,24 +38,24 @@ def digests_text(digests: Mapping[str, Collection[str]]) -> str:
 
 
 @lru_cache(maxsize=4096)
-def _parsed(text: str) -> tuple[frozenset[str], Mapping[str, frozenset[str]]]:
+def _parse_digests(text: str) -> tuple[frozenset[str], Mapping[str, frozenset[str]]]:
     usual, others = set[str](), dict[str, frozenset[str]]()
     for token in text.split():
         digest, _, key = token.partition("@")
         if key:
-            others[key] = others.get(key, frozenset()) | ({digest} - {ABSENT})
-        elif digest != ABSENT:
+            others[key] = others.get(key, frozenset()) | ({digest} - {ABSENT_DIGEST})
+        elif digest != ABSENT_DIGEST:
             usual.add(digest)
     return frozenset(usual), others
 
 
 def digests_of(text: str, combination: str) -> frozenset[str]:
     """Returns the digests of a combination in the text of `digests_text`."""
-    usual, others = _parsed(text)
+    usual, others = _parse_digests(text)
     return others.get(combination, usual)
 
 
 def all_digests(text: str) -> frozenset[str]:
     """Returns the digests of all combinations in the text of `digests_text`."""
-    usual, others = _parsed(text)
+    usual, others = _parse_digests(text)
     return usual.union(*others.values())

@@ -19,12 +19,12 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.figure_style import (
     MUTED,
     NamedFigure,
+    apply_style,
     axis_title,
     color_of,
     dash_of,
-    styled,
+    spaced_words,
     unique_labels,
-    words,
 )
 from modular_framework_benchmark.statistics.curves import Curve, performance_profile
 from modular_framework_benchmark.statistics.observations import EpisodeTable, metrics_of
@@ -63,7 +63,7 @@ def _distribution_figure(
         if values[index].size:
             _add_box(figure, name, values[index], index)
             _add_profile(figure, name, profiles[index], index, "hv" if metric.better is Direction.LOWER else "vh")
-    styled(figure, height=max(140 + 62 * len(methods), 290))
+    apply_style(figure, height=max(140 + 62 * len(methods), 290))
     figure.update_xaxes(title_text=axis_title(metric.name, metric.unit))
     figure.update_yaxes(
         tickvals=list(range(len(names))), ticktext=names, range=[len(names) - 0.5, -0.5], ticks="", row=1, col=1
@@ -75,7 +75,7 @@ def _distribution_figure(
         for column in (1, 2):
             figure.add_vline(x=metric.limit, line={"color": MUTED, "dash": "dot", "width": 1}, row=1, col=column)
     return NamedFigure(
-        f"distribution_{metric.name}", f"Distribution of {words(metric.name)}", _summary(metric, values), figure,
+        f"distribution_{metric.name}", f"Distribution of {spaced_words(metric.name)}", _summary(metric, values), figure,
         metric.component,
     )  # fmt: skip
 
@@ -113,7 +113,7 @@ def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
         ),
         row=1, col=1,
     )  # fmt: skip
-    points = thinned(np.sort(values), MAX_POINTS)
+    points = thinned_values(np.sort(values), MAX_POINTS)
     jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # evenly spaced, so that the figure is reproducible
     figure.add_trace(
         go.Scatter(
@@ -145,7 +145,7 @@ def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_
     )  # fmt: skip
 
 
-def thinned(ordered: Values, max_count: int) -> Values:
+def thinned_values(ordered: Values, max_count: int) -> Values:
     """Returns at most `max_count` of the values, evenly spaced in rank, including the first and last value."""
     if ordered.size <= max_count:
         return ordered

@@ -15,15 +15,21 @@ import plotly.graph_objects as go
 
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import FAILURE_CLASS, ExperimentResults
-from modular_framework_benchmark.reports.figure_style import NamedFigure, color_of, label, stacked_bars, unique_labels
-from modular_framework_benchmark.reports.number_text import counted
+from modular_framework_benchmark.reports.figure_style import (
+    NamedFigure,
+    color_of,
+    label_text,
+    stacked_bars,
+    unique_labels,
+)
+from modular_framework_benchmark.reports.number_text import count_phrase
 
 MAX_GROUPS = 40
 MAX_EPISODES = 10
 MAX_BARS = 12
 MAX_FILES = 6
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
-_KINDS = {".log": "log", ".mp4": "video", ".webm": "video", ".bag": "bag"}
+_NUMBER_PATTERN = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
+_KIND_OF_SUFFIX = {".log": "log", ".mp4": "video", ".webm": "video", ".bag": "bag"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +86,7 @@ class FailureGroup:
     @property
     def caption(self) -> str:
         """Returns a caption with the number of episodes shown."""
-        every = counted(self.episodes, "episode")
+        every = count_phrase(self.episodes, "episode")
         return f"All {every}." if len(self.shown) == self.episodes else f"The first {len(self.shown)} of {every}."
 
 
@@ -111,16 +117,16 @@ def group_failures(results: ExperimentResults, database_folder: Path, report_fol
         report_folder: Folder of the report, the base of its links.
     """
     table = results.episodes[results.episodes["status"] != EpisodeStatus.SUCCEEDED.value]
-    causes = {text: _NUMBER.sub("…", text) for text in table["cause"].astype(str).unique()}
+    causes = {text: _NUMBER_PATTERN.sub("…", text) for text in table["cause"].astype(str).unique()}
     classes = table[FAILURE_CLASS].astype(str) if FAILURE_CLASS in table else ""
     keyed = table.assign(group=table["cause"].astype(str).map(causes), **{FAILURE_CLASS: classes})
     groups = list(keyed.groupby([FAILURE_CLASS, "status", "group"], sort=False))
     groups.sort(key=lambda item: -len(item[1]))
     finder = _EpisodeReader(results, database_folder, report_folder)
-    found = tuple(finder.group(keys, rows) for keys, rows in groups)
+    failure_groups = tuple(finder.group(keys, rows) for keys, rows in groups)
     return Failures(
-        _by_class(found),
-        found[:MAX_GROUPS],
+        _by_class(failure_groups),
+        failure_groups[:MAX_GROUPS],
         len(groups),
         len(table),
     )
@@ -158,11 +164,11 @@ class _EpisodeReader:
 
     def episode(self, row: Mapping[object, object]) -> FailedEpisode:
         description = self.results.description
-        others = [factor.name for factor in description.factors if factor.name != description.compared]
+        other_factors = [factor.name for factor in description.factors if factor.name != description.compared]
         return FailedEpisode(
             number=int(str(row["number"])),
             method=str(row[description.compared]),
-            levels=", ".join(f"{name} {row[name]}" for name in others),
+            levels=", ".join(f"{name} {row[name]}" for name in other_factors),
             seed=int(str(row["seed"])),
             status=EpisodeStatus(str(row["status"])),
             cause=str(row["cause"]),
@@ -182,9 +188,10 @@ def episode_links(folder: str, database_folder: Path, report_folder: Path) -> tu
     path = (root / folder).resolve()
     if not folder or not path.is_relative_to(root) or not path.is_dir():
         return ()
-    files = [item for item in sorted(path.iterdir()) if item.suffix in _KINDS and item.is_file()]
+    files = [item for item in sorted(path.iterdir()) if item.suffix in _KIND_OF_SUFFIX and item.is_file()]
     file_links = [
-        Link(f"{_KINDS[item.suffix]} {item.name}", _relative(item, report_folder)) for item in files[:MAX_FILES]
+        Link(f"{_KIND_OF_SUFFIX[item.suffix]} {item.name}", _relative(item, report_folder))
+        for item in files[:MAX_FILES]
     ]
     return (Link("folder", _relative(path, report_folder) + "/"), *file_links)
 
@@ -198,21 +205,23 @@ def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure
     """Returns a bar chart of the classes of failures by method, or None without failures; of causes without classes."""
     if not failures.classes:
         return None
-    shown = dict(list(failures.classes.items())[:MAX_BARS])
-    names = unique_labels(list(shown), 64)
+    shown_classes = dict(list(failures.classes.items())[:MAX_BARS])
+    names = unique_labels(list(shown_classes), 64)
     figure = go.Figure(
         [
             go.Bar(
-                x=[counts.get(method, 0) for counts in shown.values()], y=names, orientation="h", width=0.6,
-                name=label(method), marker={"color": color_of(index), "opacity": 0.85},
-                hovertemplate=f"{label(method)}: %{{x:,}}<extra></extra>",
+                x=[counts.get(method, 0) for counts in shown_classes.values()], y=names, orientation="h", width=0.6,
+                name=label_text(method), marker={"color": color_of(index), "opacity": 0.85},
+                hovertemplate=f"{label_text(method)}: %{{x:,}}<extra></extra>",
             )
             for index, method in enumerate(methods)
         ]
     )  # fmt: skip
-    stacked_bars(figure, height=130 + 34 * len(shown), value_title="episodes")
+    stacked_bars(figure, height=130 + 34 * len(shown_classes), value_title="episodes")
     noun = "class" if failures.groups[0].failure_class else "cause"
     summary = f"Unsuccessful episodes by {noun} and method."
-    if len(failures.classes) > len(shown):
-        summary = f"{summary[:-1]}: the {len(shown)} most frequent of {counted(len(failures.classes), noun)}."
+    if len(failures.classes) > len(shown_classes):
+        summary = (
+            f"{summary[:-1]}: the {len(shown_classes)} most frequent of {count_phrase(len(failures.classes), noun)}."
+        )
     return NamedFigure("failures", f"Failures by {noun}", summary, figure)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Common style of all figures: colours for colour-blind readers, plain axes, escaped labels.
 
-Plotly interprets some HTML in every text, so each text from a database passes through `label`.
+Plotly interprets some HTML in every text, so each text from a database passes through `label_text`.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class NamedFigure:
     component: str = ""
 
 
-def label(text: str, max_length: int = MAX_LABEL_LENGTH) -> str:
+def label_text(text: str, max_length: int = MAX_LABEL_LENGTH) -> str:
     """Returns a text that Plotly displays literally, shortened with an ellipsis."""
-    shown = "".join(letter if letter.isprintable() else " " for letter in text)
-    if len(shown) > max_length:
-        shown = shown[: max_length - 1] + "…"
-    return html.escape(shown, quote=False).replace("%{", "%&#123;")
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    if len(printable) > max_length:
+        printable = printable[: max_length - 1] + "…"
+    return html.escape(printable, quote=False).replace("%{", "%&#123;")
 
 
 def color_of(index: int) -> str:
@@ -58,15 +58,15 @@ def dash_of(index: int) -> str:
 
 def axis_title(name: str, unit: str) -> str:
     """Returns the title of an axis: the name with spaces, and the unit in brackets."""
-    return label(words(name)) + (f" [{label(unit)}]" if unit else "")
+    return label_text(spaced_words(name)) + (f" [{label_text(unit)}]" if unit else "")
 
 
-def words(name: str) -> str:
+def spaced_words(name: str) -> str:
     """Returns an identifier with spaces for underscores."""
     return name.replace("_", " ")
 
 
-def styled(figure: go.Figure, height: int) -> go.Figure:
+def apply_style(figure: go.Figure, height: int) -> go.Figure:
     """Applies the common style to a figure.
 
     Args:
@@ -105,7 +105,7 @@ def stacked_bars(figure: go.Figure, height: int, value_title: str) -> go.Figure:
         height: Height [px].
         value_title: Title of the value axis.
     """
-    styled(figure, height)
+    apply_style(figure, height)
     figure.update_layout(barmode="stack", legend_traceorder="normal")
     figure.update_xaxes(title_text=value_title)
     figure.update_yaxes(autorange="reversed", ticks="")
@@ -114,10 +114,10 @@ def stacked_bars(figure: go.Figure, height: int, value_title: str) -> go.Figure:
 
 def unique_labels(names: Sequence[str], max_length: int = MAX_LABEL_LENGTH) -> list[str]:
     """Returns distinct labels for a categorical axis, even if shortened names are equal."""
-    shown: list[str] = []
+    labels: list[str] = []
     for name in names:
-        text = label(name, max_length)
-        while text in shown:
+        text = label_text(name, max_length)
+        while text in labels:
             text += " ′"
-        shown.append(text)
-    return shown
+        labels.append(text)
+    return labels

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from modular_framework_benchmark.reports import number_text
-from modular_framework_benchmark.reports.figure_style import NamedFigure, words
+from modular_framework_benchmark.reports.figure_style import NamedFigure, spaced_words
 from modular_framework_benchmark.reports.report_content import ReportContent, machine_readable
 from modular_framework_benchmark.reports.robustness_figures import FIGURE_PREFIX
 from modular_framework_benchmark.reports.robustness_tables import robustness_tables
@@ -82,7 +82,7 @@ def _as_sentence(text: str) -> str:
 
 
 def _component(content: ReportContent, name: str) -> dict[str, object]:
-    title = {"task": "Whole task", "grasp": "Grasp"}.get(name, words(name).capitalize())
+    title = {"task": "Whole task", "grasp": "Grasp"}.get(name, spaced_words(name).capitalize())
     return {
         "title": title,
         "metrics": [metric for metric in content.metrics if metric.component == name],
@@ -92,13 +92,13 @@ def _component(content: ReportContent, name: str) -> dict[str, object]:
     }
 
 
-def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFigure], **values: object) -> str:
+def render_page(template: str, data: Mapping[str, Any], shown_figures: Sequence[NamedFigure], **values: object) -> str:
     """Returns a page from a template.
 
     Args:
         template: File name in the folder of templates.
         data: JSON values embedded for programs.
-        shown: Figures that the page may show.
+        shown_figures: Figures that the page may show.
         values: Values of the template's variables.
     """
     environment = jinja2.Environment(
@@ -109,18 +109,18 @@ def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFig
         autoescape=True,
     )
     environment.filters.update(
-        words=words,
+        words=spaced_words,
         in_groups=_in_groups,
         as_sentence=_as_sentence,
         base64=lambda text: base64.b64encode(text.encode()).decode(),
         count=number_text.count_text,
-        counted=number_text.counted,
+        counted=number_text.count_phrase,
         moment=number_text.moment_text,
         duration=number_text.duration_text,
         share=number_text.percentage_text,
     )
     data_json = _in_script(json.dumps(data, allow_nan=False, ensure_ascii=False))
-    drawings = ",".join(f"{json.dumps(item.name)}:{item.figure.to_json()}" for item in shown)
+    drawings = ",".join(f"{json.dumps(item.name)}:{item.figure.to_json()}" for item in shown_figures)
     figures_json = _in_script(f"{{{drawings}}}")
     return environment.get_template(template).render(
         values,

@@ -24,14 +24,14 @@ def find_browser() -> Path:
         ReportError: No browser is installed.
     """
     named = os.environ.get("BROWSER_PATH")
-    found = shutil.which(named) if named else next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
+    browser = shutil.which(named) if named else next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
         searched = f"BROWSER_PATH is {named}" if named else f"searched PATH for {', '.join(BROWSERS)}"
         raise ReportError(
             f"figure: found no browser to draw it ({searched}); install Debian's package chromium "
             "(apt-get install chromium), or name one in BROWSER_PATH. The HTML report needs none"
         )
-    return Path(found)
+    return Path(browser)
 
 
 def find_figure(figures: Sequence[NamedFigure], name: str) -> NamedFigure:

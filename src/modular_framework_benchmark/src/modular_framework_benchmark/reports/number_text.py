@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from datetime import UTC, datetime
 
-NONE = "–"
+NO_VALUE = "–"
 MAX_DECIMALS = {"s": 3, "m": 4, "rad": 4, "Nm": 1, "N": 1, "%": 1}
 """Maximum meaningful decimals of a unit: 1 ms, 0.1 mm, 0.0001 rad."""
 
@@ -33,7 +33,7 @@ def number_text(value: float | None, decimals: int | None = None, unit: str = ""
         unit: Unit that limits the decimals, except that small values keep two digits.
     """
     if value is None or math.isnan(value):
-        return NONE
+        return NO_VALUE
     if math.isinf(value):
         return "failure"
     magnitude = math.floor(math.log10(abs(value))) if value else 0
@@ -50,7 +50,7 @@ def number_text(value: float | None, decimals: int | None = None, unit: str = ""
 def percentage_text(fraction: float | None, decimals: int = 1) -> str:
     """Returns a fraction from 0 to 1 as a percentage; a dash for None and NaN."""
     if fraction is None or not math.isfinite(fraction):
-        return NONE
+        return NO_VALUE
     return f"{number_text(100.0 * fraction, decimals)} %"
 
 
@@ -74,7 +74,7 @@ def interval_text(estimate: float | None, low: float | None, high: float | None,
 def p_value_text(p_value: float | None) -> str:
     """Returns a p value as text, with digits relevant to a decision."""
     if p_value is None or not math.isfinite(p_value):
-        return NONE
+        return NO_VALUE
     if p_value < 0.001:
         return "< 0.001"
     return f"{p_value:.3f}" if p_value < 0.1 else f"{p_value:.2f}"
@@ -85,7 +85,7 @@ def count_text(count: int) -> str:
     return f"{count:,}"
 
 
-def counted(count: int, noun: str) -> str:
+def count_phrase(count: int, noun: str) -> str:
     """Returns a count with its noun: `1 episode`, `2 episodes`."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
@@ -93,7 +93,7 @@ def counted(count: int, noun: str) -> str:
 def duration_text(seconds: float | None) -> str:
     """Returns a duration with its one or two largest units."""
     if seconds is None or not math.isfinite(seconds):
-        return NONE
+        return NO_VALUE
     if seconds < 60.0:
         return f"{number_text(seconds)} s"
     minutes = int(round(seconds / 60.0))
@@ -108,5 +108,5 @@ def duration_text(seconds: float | None) -> str:
 def moment_text(seconds: float | None) -> str:
     """Returns a time [s since 1970] as text in UTC."""
     if seconds is None or not math.isfinite(seconds):
-        return NONE
+        return NO_VALUE
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M UTC")

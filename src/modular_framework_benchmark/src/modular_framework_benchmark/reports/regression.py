@@ -20,7 +20,7 @@ from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
 from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of
 
-SIDE = "side"
+SIDE_FACTOR = "side"
 AFTER, BEFORE = "after", "before"
 
 
@@ -97,7 +97,7 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
         ReportError: The experiments differ in their factors, or share no method or no metric.
     """
     _check_factors(before.description, after.description)
-    methods, levels_notes = _common(_levels(before.description), _levels(after.description), "method")
+    methods, levels_notes = _common_names(_levels(before.description), _levels(after.description), "method")
     metrics, metric_notes = _common_metrics(before, after)
     confidence = before.description.confidence
     method_confidence = 1.0 - (1.0 - confidence) / len(methods)
@@ -114,7 +114,7 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
             "later episodes."
         )
     for method in methods:
-        merged = _merged(before, after, method, metrics, method_confidence)
+        merged = _merged_results(before, after, method, metrics, method_confidence)
         comparisons = {item.metric: item for item in compare(merged)}
         changes += [MetricChange(method, metric, comparisons[metric.name]) for metric in metrics_of(merged)]
         counts = comparisons[SUCCESS.name].counts
@@ -136,15 +136,15 @@ def _check_factors(before: ExperimentDescription, after: ExperimentDescription) 
     names = [sorted(factor.name for factor in item.factors) for item in (before, after)]
     if names[0] != names[1] or before.compared != after.compared:
         parts = [
-            f"{item.name} varies {', '.join(found)} and compares {item.compared}"
-            for item, found in zip((before, after), names, strict=True)
+            f"{item.name} varies {', '.join(factor_names)} and compares {item.compared}"
+            for item, factor_names in zip((before, after), names, strict=True)
         ]
         raise ReportError(f"{'; '.join(parts)}; experiments must have the same factors: name two such experiments")
 
 
-def _common(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple[tuple[str, ...], list[str]]:
-    found = tuple(name for name in before if name in after)
-    if not found:
+def _common_names(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple[tuple[str, ...], list[str]]:
+    common = tuple(name for name in before if name in after)
+    if not common:
         raise ReportError(
             f"no {noun} is in both experiments: one has {', '.join(before)}, the other {', '.join(after)}; "
             "name experiments that share one"
@@ -155,14 +155,14 @@ def _common(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple
         for name in names
         if name not in others
     ]
-    return found, notes
+    return common, notes
 
 
 def _common_metrics(before: ExperimentResults, after: ExperimentResults) -> tuple[tuple[Metric, ...], list[str]]:
     """Returns the metrics of both experiments with the same definition."""
     earlier = {metric.name: metric for metric in metrics_of(before)}
     later = {metric.name: metric for metric in metrics_of(after)}
-    names, notes = _common(tuple(earlier), tuple(later), "metric")
+    names, notes = _common_names(tuple(earlier), tuple(later), "metric")
     common = []
     for name in names:
         first, second = (dataclasses.replace(side[name], description="") for side in (earlier, later))
@@ -175,7 +175,7 @@ def _common_metrics(before: ExperimentResults, after: ExperimentResults) -> tupl
     return tuple(common), notes
 
 
-def _merged(
+def _merged_results(
     before: ExperimentResults, after: ExperimentResults, method: str, metrics: tuple[Metric, ...], confidence: float
 ) -> ExperimentResults:
     """Returns the episodes of a method in both experiments as an experiment that compares the two experiments."""
@@ -184,14 +184,14 @@ def _merged(
     sides = []
     for side, results in ((AFTER, after), (BEFORE, before)):
         rows = results.episodes[results.episodes[compared] == method].drop(columns=compared)
-        sides.append(rows.assign(**{SIDE: side}))
+        sides.append(rows.assign(**{SIDE_FACTOR: side}))
     key = [factor.name for factor in others] + ["trial"]
     sides[1] = _unpair_different_seeds(sides[0], sides[1], key)
-    factors = (Factor(SIDE, (AFTER, BEFORE)), *_all_levels(others, sides))
+    factors = (Factor(SIDE_FACTOR, (AFTER, BEFORE)), *_all_levels(others, sides))
     description = dataclasses.replace(
         before.description,
         factors=factors,
-        compared=SIDE,
+        compared=SIDE_FACTOR,
         metrics=metrics,
         confidence=confidence,
         sequential=before.description.sequential or after.description.sequential,
@@ -214,7 +214,7 @@ def _unpair_different_seeds(later: pd.DataFrame, earlier: pd.DataFrame, key: lis
     """Returns the earlier episodes, with an unmatched trial number where the partner's seed differs."""
     seeds = later.set_index(key)["seed"]
     partners = earlier.set_index(key)["seed"]
-    found = seeds.reindex(partners.index)
-    differs = (found.notna() & (found != partners)).to_numpy()
+    partner_seeds = seeds.reindex(partners.index)
+    differs = (partner_seeds.notna() & (partner_seeds != partners)).to_numpy()
     offset = int(max(later["trial"].max(), earlier["trial"].max())) + 1 if len(later) and len(earlier) else 0
     return earlier.assign(trial=earlier["trial"].where(~differs, earlier["trial"] + offset))

@@ -8,16 +8,22 @@ from dataclasses import asdict
 
 import plotly.graph_objects as go
 
-from modular_framework_benchmark.reports.figure_style import MUTED, NamedFigure, styled, unique_labels, words
+from modular_framework_benchmark.reports.figure_style import (
+    MUTED,
+    NamedFigure,
+    apply_style,
+    spaced_words,
+    unique_labels,
+)
 from modular_framework_benchmark.reports.html_page import render_page
-from modular_framework_benchmark.reports.number_text import counted, number_text, p_value_text
+from modular_framework_benchmark.reports.number_text import count_phrase, number_text, p_value_text
 from modular_framework_benchmark.reports.regression import Change, MetricChange, Regression
 from modular_framework_benchmark.reports.report_content import plain_json
 from modular_framework_benchmark.reports.tables import Cell, Table, metric_title, pairs_text, table_text, wins_text
 
-COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e"}
-DIFFERING = "The runs also differ in the following, which may cause a change"
-MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
+COLOR_OF_CHANGE = {Change.BETTER: "#176639", Change.WORSE: "#b3261e"}
+DIFFERENCES_TITLE = "The runs also differ in the following, which may cause a change"
+MOOD_OF_CHANGE = {Change.BETTER: "better", Change.WORSE: "worse"}
 
 
 def changes_table(regression: Regression) -> Table:
@@ -37,22 +43,22 @@ def changes_table(regression: Regression) -> Table:
 
 
 def _row(item: MetricChange) -> tuple[Cell, ...]:
-    found = item.comparison
+    comparison = item.comparison
     scale = 100.0 if item.metric.is_fraction else 1.0
     before, after = (
         number_text(None if value is None else scale * value, unit=item.metric.unit)
-        for value in (found.second_estimate, found.first_estimate)
+        for value in (comparison.second_estimate, comparison.first_estimate)
     )
-    shown = item.change in MOODS
+    is_shown = item.change in MOOD_OF_CHANGE
     return (
         Cell(item.method),
         Cell(metric_title(item.metric)),
         Cell(before, is_number=True),
         Cell(after, is_number=True),
-        Cell(wins_text(found), is_number=True),
-        Cell(p_value_text(found.p_corrected), is_number=True),
-        Cell(pairs_text(found.counts), is_number=True),
-        Cell(item.change.value, shown, mood=MOODS.get(item.change, "")),
+        Cell(wins_text(comparison), is_number=True),
+        Cell(p_value_text(comparison.p_corrected), is_number=True),
+        Cell(pairs_text(comparison.counts), is_number=True),
+        Cell(item.change.value, is_shown, mood=MOOD_OF_CHANGE.get(item.change, "")),
     )
 
 
@@ -60,7 +66,7 @@ def summary_sentences(regression: Regression) -> tuple[str, ...]:
     """Returns the changes as sentences, regressions first."""
     counts = {change: regression.count(change) for change in Change}
     text = (
-        f"{counted(counts[Change.WORSE], 'metric')} of methods got worse, {counts[Change.BETTER]:,} better; "
+        f"{count_phrase(counts[Change.WORSE], 'metric')} of methods got worse, {counts[Change.BETTER]:,} better; "
         f"no difference is shown in {counts[Change.NOT_SHOWN]:,}"
     )
     if counts[Change.NOT_SHOWABLE]:
@@ -74,7 +80,9 @@ def summary_sentences(regression: Regression) -> tuple[str, ...]:
 def regression_text(regression: Regression) -> str:
     """Returns the comparison as plain text."""
     table = changes_table(regression)
-    marks = [f"{DIFFERING}:", *(f"  {text}" for text in regression.differing), ""] if regression.differing else []
+    marks = (
+        [f"{DIFFERENCES_TITLE}:", *(f"  {text}" for text in regression.differing), ""] if regression.differing else []
+    )
     return "\n".join([*marks, *summary_sentences(regression), "", table_text(table), "", *table.notes]) + "\n"
 
 
@@ -103,7 +111,7 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
         plain_json(data),
         figures,
         regression=regression,
-        differing=DIFFERING,
+        differing=DIFFERENCES_TITLE,
         sentences=summary_sentences(regression),
         table=changes_table(regression),
         figures=figures,
@@ -125,7 +133,7 @@ def _figure(regression: Regression) -> NamedFigure | None:
         return None
     figure = go.Figure(_markers(bars))
     figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
-    styled(figure, height=130 + 30 * len(bars))
+    apply_style(figure, height=130 + 30 * len(bars))
     figure.update_layout(showlegend=False)
     figure.update_xaxes(title_text="pairs in which the later experiment is better − worse [points]")
     figure.update_yaxes(range=[len(bars) - 0.5, -0.5], ticks="")
@@ -134,13 +142,13 @@ def _figure(regression: Regression) -> NamedFigure | None:
 
 
 def _markers(bars: Sequence[tuple[MetricChange, tuple[float, ...]]]) -> list[go.Scatter]:
-    names = unique_labels([f"{item.method}, {words(item.metric.name)}" for item, _ in bars], 56)
+    names = unique_labels([f"{item.method}, {spaced_words(item.metric.name)}" for item, _ in bars], 56)
     return [
         go.Scatter(
-            x=[value], y=[name], mode="markers", marker={"color": COLORS.get(item.change, MUTED), "size": 9},
+            x=[value], y=[name], mode="markers", marker={"color": COLOR_OF_CHANGE.get(item.change, MUTED), "size": 9},
             error_x={
                 "type": "data", "symmetric": False, "array": [high - value], "arrayminus": [value - low],
-                "color": COLORS.get(item.change, MUTED), "thickness": 1.6, "width": 5,
+                "color": COLOR_OF_CHANGE.get(item.change, MUTED), "thickness": 1.6, "width": 5,
             },
             hovertemplate="%{y}: %{x:+.3g}<extra></extra>",
         )

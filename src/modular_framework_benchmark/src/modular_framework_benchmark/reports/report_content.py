@@ -147,7 +147,7 @@ class ReportContent:
         return tuple(dict.fromkeys(metric.component for metric in self.metrics))
 
 
-def gather(results: ExperimentResults, source: ReportSource, mean_intervals: bool = False) -> ReportContent:
+def gather_content(results: ExperimentResults, source: ReportSource, mean_intervals: bool = False) -> ReportContent:
     """Returns the content of the report of an experiment.
 
     Args:
@@ -166,7 +166,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods
     episodes = {item.method: item.counts.episodes for item in analysis.summaries if item.metric == SUCCESS}
-    figures = _comparison_figures(results, analysis) + _present(
+    figures = _comparison_figures(results, analysis) + _existing_figures(
         milestones_figure(spans, {name: count for name, count in episodes.items() if count}),
         *(robustness_figures(robustness) if robustness is not None else ()),
         components_figure(spans, methods),
@@ -191,8 +191,8 @@ def _component_order(metric: Metric) -> int:
 def _success_by_level(results: ExperimentResults) -> tuple[MethodSummary, ...]:
     description = results.description
     excluded = (description.compared, PERTURBATION)  # robustness curves show the perturbations
-    others = [factor.name for factor in description.factors if factor.name not in excluded]
-    return tuple(item for name in others for item in summarise_by_level(results, name) if item.metric == SUCCESS)
+    other_factors = [factor.name for factor in description.factors if factor.name not in excluded]
+    return tuple(item for name in other_factors for item in summarise_by_level(results, name) if item.metric == SUCCESS)
 
 
 def _robustness(results: ExperimentResults) -> Robustness | None:
@@ -205,7 +205,7 @@ def _robustness(results: ExperimentResults) -> Robustness | None:
 
 
 def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
-    return _present(
+    return _existing_figures(
         ranking_figure(analysis.summaries, _main_metric(results)),
         differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS])
         if len(analysis.methods) <= MAX_PAIRED_METHODS
@@ -218,7 +218,7 @@ def _main_metric(results: ExperimentResults) -> Metric | None:
     return next((item for item in results.description.metrics if item.name != SUCCESS), None)
 
 
-def _present(*figures: NamedFigure | None) -> list[NamedFigure]:
+def _existing_figures(*figures: NamedFigure | None) -> list[NamedFigure]:
     return [figure for figure in figures if figure is not None]
 
 
@@ -236,19 +236,19 @@ def _run_facts(results: ExperimentResults, snapshots: SnapshotValues) -> RunFact
             others_median=None,
             others_max=None,
         )
-    begun, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
-    ended = (begun + wall).max()
-    others = others_fractions(snapshots)
+    start_times_s, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
+    ended = (start_times_s + wall).max()
+    other_fractions = others_fractions(snapshots)
     return RunFacts(
-        begun=float(begun.min()) if math.isfinite(begun.min()) else None,
+        begun=float(start_times_s.min()) if math.isfinite(start_times_s.min()) else None,
         ended=float(ended) if math.isfinite(ended) else None,
         episode_s=float(wall.sum()),
         workers=int(episodes["worker"].nunique()),
         seeds=int(episodes["seed"].nunique()),
         trials=int(episodes["trial"].nunique()),
         cold_starts=int(episodes[COLD_START].sum()) if COLD_START in episodes else 0,
-        others_median=statistics.median(others) if others else None,
-        others_max=max(others, default=None),
+        others_median=statistics.median(other_fractions) if other_fractions else None,
+        others_max=max(other_fractions, default=None),
     )
 
 

@@ -12,12 +12,12 @@ from modular_framework_benchmark.records.perturbation import AXES, FACTOR, Pertu
 from modular_framework_benchmark.reports.figure_style import (
     MUTED,
     NamedFigure,
+    apply_style,
     axis_title,
     color_of,
     dash_of,
-    label,
-    styled,
-    words,
+    label_text,
+    spaced_words,
 )
 from modular_framework_benchmark.reports.number_text import interval_text, percentage_text
 from modular_framework_benchmark.statistics.comparison import Estimate
@@ -31,7 +31,7 @@ from modular_framework_benchmark.statistics.robustness import (
 from modular_framework_benchmark.statistics.sentences import enumeration
 
 FIGURE_PREFIX = "robustness_"
-DODGE = 0.008
+CURVE_OFFSET = 0.008
 """Distance between the points of two methods at one level, as a fraction of the tested range."""
 
 
@@ -46,7 +46,7 @@ def _figure(robustness: Robustness, axis: PerturbedAxis) -> NamedFigure:
     has_progress = any(point.progress is not None for curve in curves for point in curve.points)
     figure = make_subplots(cols=2 if has_progress else 1, horizontal_spacing=0.1)
     values = [point.value for curve in curves for point in curve.points]
-    step = DODGE * (max(values) - min(values)) if values else 0.0
+    step = CURVE_OFFSET * (max(values) - min(values)) if values else 0.0
     for index, curve in enumerate(curves):
         shift = step * (index - (len(curves) - 1) / 2)
         figure.add_trace(_points(curve, index, shift, lambda point: point.success.estimate), row=1, col=1)
@@ -57,18 +57,18 @@ def _figure(robustness: Robustness, axis: PerturbedAxis) -> NamedFigure:
             trace.update(showlegend=False, mode="lines+markers", line=_stroke(index))
             figure.add_trace(trace, row=1, col=2)
     figure.add_hline(y=100.0 * wanted, line={"color": MUTED, "width": 1, "dash": "dash"}, row=1, col=1)
-    styled(figure, height=420)
+    apply_style(figure, height=420)
     figure.update_xaxes(title_text=_title(axis))
     figure.update_yaxes(range=[-3, 103])
     figure.update_yaxes(title_text="success [%]", row=1, col=1)
     if has_progress:
         figure.update_yaxes(title_text="mean progress [%]", row=1, col=2)
     summary = (
-        f"Success of each method against {words(axis.name)}, with {percentage_text(robustness.confidence, 0)} "
+        f"Success of each method against {spaced_words(axis.name)}, with {percentage_text(robustness.confidence, 0)} "
         f"intervals of single levels. Line: {robustness.fit}. Dashed: wanted success of {percentage_text(wanted, 0)}. "
-        f"{words(axis.name).capitalize()}: {AXES[axis.name].description}"
+        f"{spaced_words(axis.name).capitalize()}: {AXES[axis.name].description}"
     )
-    return NamedFigure(f"{FIGURE_PREFIX}{axis.name}", f"Robustness to {words(axis.name)}", summary, figure)
+    return NamedFigure(f"{FIGURE_PREFIX}{axis.name}", f"Robustness to {spaced_words(axis.name)}", summary, figure)
 
 
 def _title(axis: PerturbedAxis) -> str:
@@ -83,18 +83,28 @@ def _points(
     curve: RobustnessCurve, index: int, shift: float, estimate_of: Callable[[CurvePoint], Estimate | None]
 ) -> go.Scatter:
     """Returns the estimates of a curve with their intervals."""
-    known = [(point, found) for point in curve.points if (found := estimate_of(point)) is not None]
-    ends = [(found.interval.low, found.interval.high) if found.interval else (found.value,) * 2 for _, found in known]
+    estimates = [(point, estimate) for point in curve.points if (estimate := estimate_of(point)) is not None]
+    ends = [
+        (estimate.interval.low, estimate.interval.high) if estimate.interval else (estimate.value,) * 2
+        for _, estimate in estimates
+    ]
     return go.Scatter(
-        x=[point.value + shift for point, _ in known], y=[100.0 * found.value for _, found in known], mode="markers",
-        name=label(curve.method), legendgroup=curve.method, marker={"color": color_of(index), "size": 8},
-        customdata=[(point.value, point.success.counts.succeeded, point.success.counts.episodes) for point, _ in known],
+        x=[point.value + shift for point, _ in estimates], y=[100.0 * estimate.value for _, estimate in estimates],
+        mode="markers",
+        name=label_text(curve.method), legendgroup=curve.method, marker={"color": color_of(index), "size": 8},
+        customdata=[
+            (point.value, point.success.counts.succeeded, point.success.counts.episodes) for point, _ in estimates
+        ],
         error_y={
             "type": "data", "symmetric": False, "color": color_of(index), "thickness": 1.4, "width": 5,
-            "array": [100.0 * (high - found.value) for (_, high), (_, found) in zip(ends, known, strict=True)],
-            "arrayminus": [100.0 * (found.value - low) for (low, _), (_, found) in zip(ends, known, strict=True)],
+            "array": [
+                100.0 * (high - estimate.value) for (_, high), (_, estimate) in zip(ends, estimates, strict=True)
+            ],
+            "arrayminus": [
+                100.0 * (estimate.value - low) for (low, _), (_, estimate) in zip(ends, estimates, strict=True)
+            ],
         },
-        hovertemplate=f"{label(curve.method)}, level %{{customdata[0]:.4g}}: %{{y:.1f}} % "
+        hovertemplate=f"{label_text(curve.method)}, level %{{customdata[0]:.4g}}: %{{y:.1f}} % "
         "(%{customdata[1]} of %{customdata[2]} episodes succeeded)<extra></extra>",
     )  # fmt: skip
 
@@ -111,43 +121,43 @@ def value_text(value: float, axis: PerturbedAxis) -> str:
     return f"{value:.3g}" if axis.unit == FACTOR else f"{value:.3g} {axis.unit}"
 
 
-def side_text(side: FittedSide, axis: PerturbedAxis, wanted: float) -> str:
+def side_text(side: FittedSide, axis: PerturbedAxis, wanted_success: float) -> str:
     """Returns the level at which a method falls below the wanted success; nothing outside the tested levels.
 
     Args:
         side: Fitted curve on one side of the nominal value.
         axis: Perturbed axis.
-        wanted: Wanted success rate, from 0 to 1.
+        wanted_success: Wanted success rate, from 0 to 1.
     """
 
     def text(value: float | None) -> str:
         return "" if value is None else value_text(value, axis)
 
-    rate = percentage_text(wanted, 0)
+    rate = percentage_text(wanted_success, 0)
     match side.kind:
         case CrossingKind.WITHIN:
-            found = f"below {rate} at about {text(side.crossing)}, between {text(side.last_reached)} and "
-            found += text(side.first_below)
+            crossing_text = f"below {rate} at about {text(side.crossing)}, between {text(side.last_reached)} and "
+            crossing_text += text(side.first_below)
         case CrossingKind.AT_NOMINAL:
-            found = f"below {rate} at {text(side.first_below)} already"
+            crossing_text = f"below {rate} at {text(side.first_below)} already"
         case CrossingKind.NOT_REACHED:
-            found = f"not below {rate} at the tested levels, the last of which is {text(side.values[-1])}"
-    shown = [
+            crossing_text = f"not below {rate} at the tested levels, the last of which is {text(side.values[-1])}"
+    shown_texts = [
         *([f"shown to reach {rate} up to {text(side.shown_reached)}"] if side.shown_reached is not None else []),
         *([f"shown to be below from {text(side.shown_below)}"] if side.shown_below is not None else []),
     ]
-    return found + (f" ({'; '.join(shown)})" if shown else "")
+    return crossing_text + (f" ({'; '.join(shown_texts)})" if shown_texts else "")
 
 
 def robustness_sentences(robustness: Robustness) -> tuple[str, ...]:
     """Returns the falls along the axes, and for each curve the level at which it falls below the wanted success."""
-    wanted = robustness.perturbations.wanted_success
+    wanted_success = robustness.perturbations.wanted_success
     lines = [_falls_sentence(robustness)]
     for name in robustness.order:
         for curve in robustness.of_axis(name):
-            found = [side_text(side, curve.axis, wanted) for side in curve.sides]
-            if found:
-                lines.append(f"{words(name)}, {curve.method}: {' and '.join(found)}")
+            side_texts = [side_text(side, curve.axis, wanted_success) for side in curve.sides]
+            if side_texts:
+                lines.append(f"{spaced_words(name)}, {curve.method}: {' and '.join(side_texts)}")
     return tuple(line for line in lines if line)
 
 
@@ -158,12 +168,14 @@ def _falls_sentence(robustness: Robustness) -> str:
     if not curves:
         return ""
     falls = enumeration([f"{_fall_text(curve)} for {curve.method}" for curve in curves])
-    largest = f"the largest mean fall in success is along {words(name)}: {falls}"
+    largest = f"the largest mean fall in success is along {spaced_words(name)}: {falls}"
     if not robustness.perturbations.one_at_a_time:
         return largest
-    shown = [words(axis) for axis in robustness.order if any(_is_shown(curve) for curve in robustness.of_axis(axis))]
-    verb = "are" if len(shown) > 1 else "is"
-    return f"{enumeration(shown) if shown else 'no axis'} {verb} shown to lower success; {largest}"
+    shown_axes = [
+        spaced_words(axis) for axis in robustness.order if any(_is_shown(curve) for curve in robustness.of_axis(axis))
+    ]
+    verb = "are" if len(shown_axes) > 1 else "is"
+    return f"{enumeration(shown_axes) if shown_axes else 'no axis'} {verb} shown to lower success; {largest}"
 
 
 def _is_shown(curve: RobustnessCurve) -> bool:
@@ -181,9 +193,9 @@ def fall_text(curve: RobustnessCurve) -> str:
     """Returns the largest fall of a curve in points with its interval; "" without a fall."""
     if curve.fall is None:
         return ""
-    found = curve.fall.points
-    low, high = (None, None) if found.interval is None else (found.interval.low, found.interval.high)
-    return interval_text(100.0 * found.value, _percent(low), _percent(high), "%")
+    points = curve.fall.points
+    low, high = (None, None) if points.interval is None else (points.interval.low, points.interval.high)
+    return interval_text(100.0 * points.value, _percent(low), _percent(high), "%")
 
 
 def _percent(fraction: float | None) -> float | None:

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from modular_framework_benchmark.records.perturbation import PerturbedAxis
-from modular_framework_benchmark.reports.figure_style import words
-from modular_framework_benchmark.reports.number_text import NONE, count_text, percentage_text
+from modular_framework_benchmark.reports.figure_style import spaced_words
+from modular_framework_benchmark.reports.number_text import NO_VALUE, count_text, percentage_text
 from modular_framework_benchmark.reports.report_content import ReportContent
 from modular_framework_benchmark.reports.robustness_figures import fall_text, side_text, value_text
 from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text
@@ -15,22 +15,33 @@ from modular_framework_benchmark.statistics.robustness import CurvePoint, Robust
 
 def robustness_tables(content: ReportContent) -> tuple[Table, ...]:
     """Returns the falls in success along each axis, and success and progress at each level."""
-    found = content.robustness
-    return () if found is None else (_falls_table(found), _levels_table(found))
+    robustness = content.robustness
+    return () if robustness is None else (_falls_table(robustness), _levels_table(robustness))
 
 
 def _falls_table(robustness: Robustness) -> Table:
-    wanted = robustness.perturbations.wanted_success
+    wanted_success = robustness.perturbations.wanted_success
     rows = []
     for name in robustness.order:
         for curve in robustness.of_axis(name):
-            sides = "; ".join(side_text(side, curve.axis, wanted) for side in curve.sides)
-            at = value_text(curve.fall.value, curve.axis) if curve.fall else NONE
-            texts = (fall_text(curve) or NONE, at)
+            sides = "; ".join(side_text(side, curve.axis, wanted_success) for side in curve.sides)
+            at = value_text(curve.fall.value, curve.axis) if curve.fall else NO_VALUE
+            texts = (fall_text(curve) or NO_VALUE, at)
             rows.append(
-                (Cell(words(name)), Cell(curve.method), *(Cell(text, is_number=True) for text in texts), Cell(sides))
+                (
+                    Cell(spaced_words(name)),
+                    Cell(curve.method),
+                    *(Cell(text, is_number=True) for text in texts),
+                    Cell(sides),
+                )
             )
-    columns = ("axis", "method", "largest fall [points] (interval)", "at", f"success of {percentage_text(wanted, 0)}")
+    columns = (
+        "axis",
+        "method",
+        "largest fall [points] (interval)",
+        "at",
+        f"success of {percentage_text(wanted_success, 0)}",
+    )
     caption = "Axes of perturbation, the axis with the largest mean fall in success first."
     return Table("robustness", caption, columns, tuple(rows), _notes(robustness))
 
@@ -49,11 +60,11 @@ def _notes(robustness: Robustness) -> tuple[str, ...]:
 def _levels_table(robustness: Robustness) -> Table:
     rows = [
         (
-            Cell(words(curve.axis.name)),
+            Cell(spaced_words(curve.axis.name)),
             Cell(curve.method),
             Cell(_level_text(point, curve.axis), is_number=True),
             Cell(estimate_text(point.success.estimate, SUCCESS), is_number=True),
-            Cell(estimate_text(point.progress.mean, SUCCESS) if point.progress else NONE, is_number=True),
+            Cell(estimate_text(point.progress.mean, SUCCESS) if point.progress else NO_VALUE, is_number=True),
             Cell(count_text(point.success.counts.succeeded), is_number=True),
             Cell(count_text(point.success.counts.counted), is_number=True),
         )

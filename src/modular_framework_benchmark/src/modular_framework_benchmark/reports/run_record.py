@@ -15,7 +15,7 @@ from modular_framework_benchmark.records.level_digests import all_digests, combi
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.records.snapshot_parts import REFERENCE, PartKind, kind_of
 from modular_framework_benchmark.records.used_software import IMPLEMENTATION
-from modular_framework_benchmark.reports.number_text import counted
+from modular_framework_benchmark.reports.number_text import count_phrase
 from modular_framework_ros.reported_figures import Clock
 
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
@@ -51,25 +51,27 @@ def recorded_values(snapshots: SnapshotValues) -> tuple[RecordedValue, ...]:
     Args:
         snapshots: Distinct values of each snapshot part with their numbers of episodes.
     """
-    return tuple(_recorded(name, counts) for name, counts in _counts(snapshots).items())[:MAX_PARAMETERS]
+    return tuple(_make_recorded_value(name, counts) for name, counts in _count_values(snapshots).items())[
+        :MAX_PARAMETERS
+    ]
 
 
-def _recorded(name: str, counts: Mapping[str, int]) -> RecordedValue:
+def _make_recorded_value(name: str, counts: Mapping[str, int]) -> RecordedValue:
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     return RecordedValue(name, tuple(ordered[:MAX_VALUES]), max(len(ordered) - MAX_VALUES, 0))
 
 
-def _counts(snapshots: SnapshotValues) -> dict[str, dict[str, int]]:
+def _count_values(snapshots: SnapshotValues) -> dict[str, dict[str, int]]:
     """Returns the number of episodes of each value, by path of keys."""
     counts: dict[str, dict[str, int]] = {}
     for name, values in snapshots.items():
         for value, episodes in values if kind_of(name) is not PartKind.MEASURED else ():
             for path, text in _leaves(value, name):
-                _add(counts.setdefault(path, {}), {text: episodes})
+                _add_counts(counts.setdefault(path, {}), {text: episodes})
     return counts
 
 
-def _add(counts: dict[str, int], more: Mapping[str, int]) -> None:
+def _add_counts(counts: dict[str, int], more: Mapping[str, int]) -> None:
     for text, episodes in more.items():
         counts[text] = counts.get(text, 0) + episodes
 
@@ -94,21 +96,22 @@ def warnings_of(
         combinations: The same by combination of levels.
     """
     episodes = results.episodes
-    found = []
+    warnings = []
     if len(episodes) < results.planned:
-        found.append(
-            f"{len(episodes):,} of {counted(results.planned, 'planned episode')} are finished; figures cover these."
+        warnings.append(
+            f"{len(episodes):,} of {count_phrase(results.planned, 'planned episode')} are finished; "
+            "figures cover these."
         )
     broken = episodes[episodes["status"] == "broken"]
     if len(broken):
         numbers = ", ".join(str(number) for number in broken["number"].head(12))
         more = f" and {len(broken) - 12:,} more" if len(broken) > 12 else ""
         verb = "is" if len(broken) == 1 else "are"
-        found.append(
-            f"{counted(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
+        warnings.append(
+            f"{count_phrase(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
             f"{numbers}{more}). They count as failures; the comparisons name the conclusions that depend on them."
         )
-    return (*found, *_inconsistent(combinations), *_incidents(snapshots), *_load_warning(results, snapshots))
+    return (*warnings, *_inconsistent(combinations), *_incidents(snapshots), *_load_warning(results, snapshots))
 
 
 def _inconsistent(combinations: CombinationSnapshots) -> Iterator[str]:
@@ -116,18 +119,19 @@ def _inconsistent(combinations: CombinationSnapshots) -> Iterator[str]:
     software: dict[str, dict[str, int]] = {}
     content: dict[str, dict[str, int]] = {}
     for snapshots in combinations.values():
-        for name, counts in _counts(snapshots).items():
+        for name, counts in _count_values(snapshots).items():
             if kind_of(name) is PartKind.SOFTWARE:
-                _add(software.setdefault(name, {}), counts)
+                _add_counts(software.setdefault(name, {}), counts)
             elif kind_of(name) is PartKind.CONTENT and not name.endswith(IMPLEMENTATION):
-                known = {text: episodes for text, episodes in counts.items() if text}
-                if len(known) > 1:
-                    _add(content.setdefault(name, {}), known)
-    for episodes, found in (("The episodes", software), ("Episodes with the same levels", content)):
-        for name, counts in found.items():
+                known_counts = {text: episodes for text, episodes in counts.items() if text}
+                if len(known_counts) > 1:
+                    _add_counts(content.setdefault(name, {}), known_counts)
+    for episodes, inconsistent_names in (("The episodes", software), ("Episodes with the same levels", content)):
+        for name, counts in inconsistent_names.items():
             if len(counts) > 1:
                 values = "; ".join(
-                    f"{text or 'none'} ({counted(count, 'episode')})" for text, count in _recorded(name, counts).values
+                    f"{text or 'none'} ({count_phrase(count, 'episode')})"
+                    for text, count in _make_recorded_value(name, counts).values
                 )
                 yield f"{episodes} did not all run with the same {name}: {values}."
 
@@ -140,10 +144,10 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
             faults.setdefault(metric, []).append((text, episodes))
     for metric, texts in faults.items():
         count = sum(episodes for _, episodes in texts)
-        yield f"The metric {metric} raised an error in {counted(count, 'episode')}: {texts[0][0]}."
+        yield f"The metric {metric} raised an error in {count_phrase(count, 'episode')}: {texts[0][0]}."
     tries = [text for value, episodes in snapshots.get("earlier_tries", ()) for text in value * episodes]
     if tries:
-        yield f"{counted(len(tries), 'attempt')} ended without a record, and the episodes ran again: {tries[0]}."
+        yield f"{count_phrase(len(tries), 'attempt')} ended without a record, and the episodes ran again: {tries[0]}."
 
 
 def others_fractions(snapshots: SnapshotValues) -> list[float]:
@@ -158,8 +162,8 @@ def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iter
     names = [metric.name for metric in results.description.metrics if metric.clock is Clock.WALL]
     if busy and names:
         yield (
-            f"{counted(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions):.0f} % of "
-            f"the machine, which lengthens real times ({', '.join(names)})."
+            f"{count_phrase(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions):.0f} % "
+            f"of the machine, which lengthens real times ({', '.join(names)})."
         )
 
 
@@ -173,14 +177,14 @@ def differences_of(before: CombinationSnapshots, after: CombinationSnapshots) ->
         after: Snapshots of the later experiment.
     """
     combinations = [name for name in before if name in after]
-    values = [{each: _counts(snapshots) for each, snapshots in side.items()} for side in (before, after)]
-    whole = [_pooled(side.values()) for side in values]
-    found = []
+    values = [{each: _count_values(snapshots) for each, snapshots in side.items()} for side in (before, after)]
+    whole = [_pooled_values(side.values()) for side in values]
+    differences = []
     for name in dict.fromkeys([*whole[0], *whole[1]]):
         sides = [side.get(name, set()) for side in whole]
         if kind_of(name) is PartKind.SOFTWARE or not combinations or not all(sides):
             if not _are_same(name, sides, pooled=True):
-                found.append(f"{name}{_difference(sides)}")
+                differences.append(f"{name}{_difference(sides)}")
             continue
         texts: dict[str, list[str]] = {}
         for combination in combinations:
@@ -189,21 +193,21 @@ def differences_of(before: CombinationSnapshots, after: CombinationSnapshots) ->
                 texts.setdefault(_difference(sides), []).append(combination)
         for text, of_text in texts.items():
             where = "" if len(of_text) == len(combinations) else f" with {'; '.join(of_text[:MAX_VALUES])}"
-            found.append(f"{name}{where}{text}")
+            differences.append(f"{name}{where}{text}")
     times = [
         [float(value) for snapshots in side.values() for value, _ in snapshots.get(REFERENCE, ())]
         for side in (before, after)
     ]
-    if all(times) and any(text.startswith("machine.") for text in found):
+    if all(times) and any(text.startswith("machine.") for text in differences):
         medians = [statistics.median(side) for side in times]
-        found.append(
+        differences.append(
             f"the machines: the reference workload takes {medians[0]:.3f} s before and {medians[1]:.3f} s after "
             f"({medians[1] / medians[0]:.2f} times)"
         )
-    return tuple(found)
+    return tuple(differences)
 
 
-def _pooled(combinations: Iterable[Mapping[str, Iterable[str]]]) -> dict[str, set[str]]:
+def _pooled_values(combinations: Iterable[Mapping[str, Iterable[str]]]) -> dict[str, set[str]]:
     """Returns the values of all combinations, by path of keys."""
     pooled: dict[str, set[str]] = {}
     for counts in combinations:

@@ -98,18 +98,20 @@ def choose_episodes(
     )
 
 
-def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.DataFrame) -> tuple[SpanSummary, ...]:
+def summarise_spans(
+    results: ExperimentResults, totals: pd.DataFrame, shown_episodes: pd.DataFrame
+) -> tuple[SpanSummary, ...]:
     """Returns a summary of each state and component for each method.
 
     Args:
         results: Finished episodes.
         totals: A row per kind, name and method, with the columns `kind`, `name`, the compared factor's name,
             `count`, `ended`, `failed`, `total_s` and `covered_s`.
-        shown: Spans of some episodes, which define the order of the states.
+        shown_episodes: Spans of some episodes, which define the order of the states.
     """
     methods = methods_of(results)
     episodes = results.episodes[results.description.compared].value_counts()
-    order = {name: rank for rank, name in enumerate(dict.fromkeys(shown["name"]))}
+    order = {name: rank for rank, name in enumerate(dict.fromkeys(shown_episodes["name"]))}
     rows = totals.rename(columns={results.description.compared: "method"}).to_dict("records")
     summaries = [
         SpanSummary(

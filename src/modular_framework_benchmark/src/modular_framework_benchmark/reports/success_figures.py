@@ -14,15 +14,15 @@ from modular_framework_benchmark.reports.figure_style import (
     INK,
     MUTED,
     NamedFigure,
+    apply_style,
     axis_title,
     color_of,
     dash_of,
-    label,
-    styled,
+    label_text,
+    spaced_words,
     unique_labels,
-    words,
 )
-from modular_framework_benchmark.reports.number_text import count_text, counted, percentage_text
+from modular_framework_benchmark.reports.number_text import count_phrase, count_text, percentage_text
 from modular_framework_benchmark.reports.span_tables import SpanSummary
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary
 
@@ -50,33 +50,37 @@ def ranking_figure(summaries: Sequence[MethodSummary], main: Metric | None) -> N
     figure = make_subplots(cols=2 if drawn else 1, shared_yaxes=True, horizontal_spacing=0.06)
     names = unique_labels(ranked)
     figure.add_trace(_dots(names, [of_success[method] for method in ranked], 100.0), row=1, col=1)
-    styled(figure, height=110 + 34 * len(ranked))
+    apply_style(figure, height=110 + 34 * len(ranked))
     figure.update_xaxes(range=[-2, 102], title_text="success [%]", row=1, col=1)
     if main and drawn:
         figure.add_trace(_dots(names, [values.get(method) for method in ranked], 1.0), row=1, col=2)
         figure.update_xaxes(title_text="median " + axis_title(main.name, main.unit), row=1, col=2)
     figure.update_layout(showlegend=False)
     figure.update_yaxes(autorange="reversed", ticks="", categoryorder="array", categoryarray=names)
-    rank = "by success" + (f", then by {words(main.name)}" if main else "")
+    rank = "by success" + (f", then by {spaced_words(main.name)}" if main else "")
     summary = f"Methods ranked {rank}. Whiskers are intervals of single methods; differences are compared above."
     return NamedFigure("ranking", "Methods, the best first", summary, figure)
 
 
 def _dots(names: Sequence[str], estimates: Sequence[Estimate | None], scale: float) -> go.Scatter:
     """Returns a dot per estimate, with whiskers for an interval; infinite ends are not drawn."""
-    known = [(name, part) for name, part in zip(names, estimates, strict=True) if part and math.isfinite(part.value)]
-    ends = [(part.interval.low, part.interval.high) if part.interval else (part.value,) * 2 for _, part in known]
+    known_parts = [
+        (name, part) for name, part in zip(names, estimates, strict=True) if part and math.isfinite(part.value)
+    ]
+    ends = [(part.interval.low, part.interval.high) if part.interval else (part.value,) * 2 for _, part in known_parts]
     whiskers = [
         tuple(end if math.isfinite(end) else part.value for end in pair)
-        for pair, (_, part) in zip(ends, known, strict=True)
+        for pair, (_, part) in zip(ends, known_parts, strict=True)
     ]
     return go.Scatter(
-        x=[scale * part.value for _, part in known], y=[name for name, _ in known], mode="markers",
+        x=[scale * part.value for _, part in known_parts], y=[name for name, _ in known_parts], mode="markers",
         marker={"color": INK, "size": 9},
         error_x={
             "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 6,
-            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(whiskers, known, strict=True)],
-            "arrayminus": [scale * (part.value - low) for (low, _), (_, part) in zip(whiskers, known, strict=True)],
+            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(whiskers, known_parts, strict=True)],
+            "arrayminus": [
+                scale * (part.value - low) for (low, _), (_, part) in zip(whiskers, known_parts, strict=True)
+            ],
         },
         hovertemplate="%{y}: %{x:.4g}<extra></extra>",
     )  # fmt: skip
@@ -88,17 +92,19 @@ def differences_figure(comparisons: Sequence[Comparison]) -> NamedFigure | None:
     Args:
         comparisons: Comparisons for the metric `success`.
     """
-    known = [(item, item.difference) for item in comparisons if item.difference and item.difference.interval]
-    if not known:
+    known_differences = [
+        (item, item.difference) for item in comparisons if item.difference and item.difference.interval
+    ]
+    if not known_differences:
         return None
-    names = unique_labels([f"{item.first} − {item.second}" for item, _ in known], 56)
-    figure = go.Figure(_dots(names, [difference for _, difference in known], 100.0))
+    names = unique_labels([f"{item.first} − {item.second}" for item, _ in known_differences], 56)
+    figure = go.Figure(_dots(names, [difference for _, difference in known_differences], 100.0))
     figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
-    styled(figure, height=120 + 44 * len(known))
+    apply_style(figure, height=120 + 44 * len(known_differences))
     figure.update_layout(showlegend=False)
     figure.update_xaxes(title_text="difference in success [points]")
     figure.update_yaxes(autorange="reversed", ticks="")
-    first = known[0][1].interval
+    first = known_differences[0][1].interval
     kind = f"{percentage_text(first.confidence, 0)} interval, {first.method}" if first else ""
     summary = f"Difference in success between methods. Whiskers: {kind}. Right of 0 the first method is better."
     return NamedFigure("differences", "Differences in success", summary, figure)
@@ -114,25 +120,25 @@ def levels_figure(summaries: Sequence[MethodSummary], methods: Sequence[str]) ->
     rows = list(dict.fromkeys(item.levels for item in summaries if item.levels))
     if not rows:
         return None
-    found = {(item.levels, item.method): item for item in summaries}
-    shown = rows[:MAX_ROWS]
-    cells = [[found.get((row, method)) for method in methods] for row in shown]
+    summary_of = {(item.levels, item.method): item for item in summaries}
+    shown_rows = rows[:MAX_ROWS]
+    cells = [[summary_of.get((row, method)) for method in methods] for row in shown_rows]
     figure = go.Figure(
         go.Heatmap(
             z=[[cell.estimate.value if cell and cell.estimate else None for cell in line] for line in cells],
-            x=unique_labels(methods), y=unique_labels([level_words(row) for row in shown]), zmin=0.0, zmax=1.0,
+            x=unique_labels(methods), y=unique_labels([level_words(row) for row in shown_rows]), zmin=0.0, zmax=1.0,
             xgap=3, ygap=3, colorscale=[[0.0, "#f0cfb8"], [0.5, "#f7f7f4"], [1.0, "#a9cbe6"]],
             text=[[_cell_text(cell) for cell in line] for line in cells], texttemplate="%{text}",
             colorbar={"tickformat": ".0%", "thickness": 10, "outlinewidth": 0},
             hovertemplate="%{y}, %{x}: %{z:.1%}<extra></extra>",
         )
     )  # fmt: skip
-    styled(figure, height=100 + max(34 * len(shown), 100))
+    apply_style(figure, height=100 + max(34 * len(shown_rows), 100))
     figure.update_yaxes(autorange="reversed", ticks="", showgrid=False)
     figure.update_xaxes(side="top", ticks="", showgrid=False)
     summary = "Success rate of each method at each level of the other factors, with the number of episodes."
-    if len(rows) > len(shown):
-        summary += f" The first {len(shown)} of {counted(len(rows), 'level')} are drawn; the table has all."
+    if len(rows) > len(shown_rows):
+        summary += f" The first {len(shown_rows)} of {count_phrase(len(rows), 'level')} are drawn; the table has all."
     return NamedFigure("levels", "Success by level of the other factors", summary, figure)
 
 
@@ -148,18 +154,19 @@ def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, int])
     if not names:
         return None
     reached = {(item.method, item.name): item.runs - item.failed for item in milestones}
-    labels = unique_labels([words(name) for name in names], 24)
+    labels = unique_labels([spaced_words(name) for name in names], 24)
     figure = go.Figure()
     for index, (method, count) in enumerate(episodes.items()):
         numbers = [reached.get((method, name), 0) for name in names]
         figure.add_trace(
             go.Scatter(
-                x=labels, y=[100.0 * number / count for number in numbers], name=label(method), mode="lines+markers",
-                customdata=numbers, line={"color": color_of(index), "dash": dash_of(index)}, marker={"size": 8},
-                hovertemplate=f"{label(method)}: %{{customdata}} of {count:,} episodes<extra></extra>",
+                x=labels, y=[100.0 * number / count for number in numbers], name=label_text(method),
+                mode="lines+markers", customdata=numbers, marker={"size": 8},
+                line={"color": color_of(index), "dash": dash_of(index)},
+                hovertemplate=f"{label_text(method)}: %{{customdata}} of {count:,} episodes<extra></extra>",
             )
         )  # fmt: skip
-    styled(figure, height=380)
+    apply_style(figure, height=380)
     figure.update_yaxes(range=[-2, 102], title_text="episodes that reached it [%]")
     summary = "Fraction of each method's finished episodes that reached each milestone, in the order of the task."
     return NamedFigure("milestones", "How far", summary, figure)
@@ -168,10 +175,10 @@ def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, int])
 def level_words(levels: str) -> str:
     """Returns `object=can` as `object: can`."""
     factor, _, level = levels.partition("=")
-    return f"{words(factor)}: {level}"
+    return f"{spaced_words(factor)}: {level}"
 
 
 def _cell_text(cell: MethodSummary | None) -> str:
     if cell is None or cell.estimate is None:
         return "none"
-    return label(f"{percentage_text(cell.estimate.value, 0)}  ({count_text(cell.counts.counted)})")
+    return label_text(f"{percentage_text(cell.estimate.value, 0)}  ({count_text(cell.counts.counted)})")

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modular_framework_benchmark.records.experiment import Metric
-from modular_framework_benchmark.reports.figure_style import words
+from modular_framework_benchmark.reports.figure_style import spaced_words
 from modular_framework_benchmark.reports.number_text import (
-    NONE,
+    NO_VALUE,
+    count_phrase,
     count_text,
-    counted,
     interval_text,
     number_text,
     p_value_text,
@@ -92,13 +92,13 @@ def answer_text(content: ReportContent) -> str:
 def overview_table(content: ReportContent) -> Table:
     """Returns each metric of each method with its interval, and the shown differences."""
     methods = content.analysis.methods
-    found = {(item.metric, item.method): item for item in content.analysis.summaries}
+    summary_of = {(item.metric, item.method): item for item in content.analysis.summaries}
     rows = []
     for metric in content.metrics:
         of_metric = [item for item in content.analysis.comparisons if item.metric == metric.name]
         best = _better_than_all(of_metric, methods)
         estimates = [
-            Cell(estimate_text(_estimate(found.get((metric.name, method))), metric), method == best, True)
+            Cell(estimate_text(_estimate(summary_of.get((metric.name, method))), metric), method == best, True)
             for method in methods
         ]
         rows.append((Cell(metric_title(metric)), *estimates, Cell(shown_text(of_metric))))
@@ -116,7 +116,7 @@ def _without_interval(content: ReportContent) -> str:
     estimates = [item.estimate for item in content.analysis.summaries if item.estimate]
     estimates += [item.difference for item in content.analysis.comparisons if item.difference]
     without = sum(estimate.interval is None for estimate in estimates)
-    return f"{without} of {counted(len(estimates), 'figure')} (rates, medians and differences) have no interval."
+    return f"{without} of {count_phrase(len(estimates), 'figure')} (rates, medians and differences) have no interval."
 
 
 def _main_metric(content: ReportContent) -> Metric | None:
@@ -142,21 +142,23 @@ def _needed_episodes(content: ReportContent, metrics: Sequence[Metric]) -> list[
 def answer_table(content: ReportContent) -> Table:
     """Returns a row per method: episodes, success, the main metric, and the most frequent failure."""
     main = _main_metric(content)
-    found = {(item.metric, item.method): item for item in content.analysis.summaries}
+    summary_of = {(item.metric, item.method): item for item in content.analysis.summaries}
     success = next(metric for metric in content.metrics if metric.name == SUCCESS)
     rows = []
     for method in content.analysis.methods:
-        counts = found[SUCCESS, method].counts
+        counts = summary_of[SUCCESS, method].counts
         row = [
             Cell(method),
             Cell(f"{counts.succeeded:,} of {counts.episodes:,}", is_number=True),
-            Cell(estimate_text(found[SUCCESS, method].estimate, success), is_number=True),
+            Cell(estimate_text(summary_of[SUCCESS, method].estimate, success), is_number=True),
         ]
         if main is not None:
-            row.append(Cell(estimate_text(found[main.name, method].estimate, main), is_number=True))
+            row.append(Cell(estimate_text(summary_of[main.name, method].estimate, main), is_number=True))
         causes = [group for group in content.failures.groups if group.by_method.get(method)]
         most_frequent = max(causes, key=lambda group: group.by_method[method], default=None)
-        row.append(Cell(f"{most_frequent.by_method[method]}: {most_frequent.cause[:90]}" if most_frequent else NONE))
+        row.append(
+            Cell(f"{most_frequent.by_method[method]}: {most_frequent.cause[:90]}" if most_frequent else NO_VALUE)
+        )
         rows.append(tuple(row))
     columns = ["method", "succeeded of episodes", "success [%] (interval)"]
     columns += [] if main is None else [f"median {metric_title(main)} (interval)"]
@@ -177,18 +179,24 @@ def answer_sentences(content: ReportContent) -> tuple[str, ...]:
     won = [item for item in comparisons if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)]
     lines = [item.sentence for item in won]
     if len(content.analysis.methods) > MAX_PAIRED_METHODS:
-        lines = [line for metric in content.metrics for line in _grouped([i for i in won if i.metric == metric.name])]
+        lines = [
+            line
+            for metric in content.metrics
+            for line in _difference_lines([i for i in won if i.metric == metric.name])
+        ]
     counts = {verdict: sum(item.verdict is verdict for item in comparisons) for verdict in Verdict}
     unshown = [
         (counts[Verdict.NOT_SHOWN], "no difference shown"),
         (counts[Verdict.NOT_SHOWABLE], _not_showable(comparisons)),
         (counts[Verdict.NO_DATA], "nothing to compare"),
     ]
-    parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in unshown if number]
+    parts = [
+        f"{text} in {number:,} of {count_phrase(len(comparisons), 'comparison')}" for number, text in unshown if number
+    ]
     return (*lines, *(["; ".join(parts)] if parts else []), *robustness)
 
 
-def _grouped(items: Sequence[Comparison]) -> list[str]:
+def _difference_lines(items: Sequence[Comparison]) -> list[str]:
     """Returns the shown differences in a metric; methods that are better than the same others share a line."""
     wins: dict[str, dict[str, float]] = {}
     for item in items:
@@ -203,8 +211,8 @@ def _grouped(items: Sequence[Comparison]) -> list[str]:
         span = f"{min(points):.0f} to {max(points):.0f}" if len(points) > 1 else f"{points[0]:.0f}"
         verb = "is" if len(methods) == 1 else "are"
         lines.append(
-            f"{words(items[0].metric)}: {enumeration(methods)} {verb} better than {enumeration(others)} in more pairs "
-            f"than worse (+{span} points)"
+            f"{spaced_words(items[0].metric)}: {enumeration(methods)} {verb} better than {enumeration(others)} in more "
+            f"pairs than worse (+{span} points)"
         )
     return lines
 
@@ -235,7 +243,7 @@ def metric_title(metric: Metric) -> str:
     notes = [unit, *([metric.clock.value] if metric.clock else [])]
     notes += [metric.source.value] if metric.source is Source.SAID else []
     noted = ", ".join(filter(None, notes))
-    return f"{words(metric.name)}{f' [{noted}]' if noted else ''}{NO_BREAK}{arrow}"
+    return f"{spaced_words(metric.name)}{f' [{noted}]' if noted else ''}{NO_BREAK}{arrow}"
 
 
 def _estimate(summary: MethodSummary | None) -> Estimate | None:
@@ -245,43 +253,43 @@ def _estimate(summary: MethodSummary | None) -> Estimate | None:
 def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
     """Returns an estimate with its interval, without unit; a rate is in percent."""
     if estimate is None:
-        return NONE
+        return NO_VALUE
     scale, unit = (100.0, "%") if metric.is_fraction else (1.0, metric.unit)
     if estimate.interval is None:
         return number_text(scale * estimate.value, unit=unit)
     return interval_text(scale * estimate.value, scale * estimate.interval.low, scale * estimate.interval.high, unit)
 
 
-def wins_text(found: Comparison) -> str:
+def wins_text(comparison: Comparison) -> str:
     """Returns the win difference of a comparison in points with its interval."""
-    return estimate_text(found.difference, SUCCESS_METRIC)
+    return estimate_text(comparison.difference, SUCCESS_METRIC)
 
 
 def pairs_text(counts: PairCounts) -> str:
     """Returns the number of compared pairs and of their units."""
     if not counts.pairs:
-        return NONE
+        return NO_VALUE
     units = f" of {counts.units:,} units" if counts.units < counts.pairs else ""
     return f"{counts.pairs:,}{units}{' at random' if counts.at_random else ''}"
 
 
 def shown_text(comparisons: Sequence[Comparison]) -> str:
     """Returns the shown differences between methods in a metric."""
-    shown = []
+    shown_texts = []
     for item in comparisons:
         match item.verdict:
             case Verdict.FIRST_BETTER:
-                shown.append(f"{item.first} better than {item.second}")
+                shown_texts.append(f"{item.first} better than {item.second}")
             case Verdict.SECOND_BETTER:
-                shown.append(f"{item.second} better than {item.first}")
+                shown_texts.append(f"{item.second} better than {item.first}")
             case Verdict.NOT_SHOWN | Verdict.NOT_SHOWABLE | Verdict.NO_DATA:
                 continue
-    if shown:
-        return "; ".join(shown)
+    if shown_texts:
+        return "; ".join(shown_texts)
     verdicts = {item.verdict for item in comparisons}
     if Verdict.NOT_SHOWN in verdicts:
         return "no difference shown"
-    return "could not be shown" if Verdict.NOT_SHOWABLE in verdicts else NONE
+    return "could not be shown" if Verdict.NOT_SHOWABLE in verdicts else NO_VALUE
 
 
 def method_table(content: ReportContent, component: str) -> Table:
@@ -297,7 +305,7 @@ def method_table(content: ReportContent, component: str) -> Table:
         "metric", "method", "rate or median (interval)", "quartiles", "mean", "counted", "units", "at the limit",
         "missing",
     )  # fmt: skip
-    caption = f"Methods by the metrics of {words(component)}."
+    caption = f"Methods by the metrics of {spaced_words(component)}."
     return Table(f"methods_{component}", caption, columns, tuple(rows), tuple(_needed_episodes(content, metrics)))
 
 
@@ -307,11 +315,11 @@ def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
     ends = [number_text(None if end is None else scale * end, unit=unit) for end in (low, high)]
     texts = (
         estimate_text(item.estimate, metric),
-        f"{ends[0]} to {ends[1]}" if item.quartiles else NONE,
+        f"{ends[0]} to {ends[1]}" if item.quartiles else NO_VALUE,
         estimate_text(item.mean, metric),
         count_text(item.counts.counted),
         count_text(item.counts.units),
-        count_text(item.counts.censored) if metric.limit is not None else NONE,
+        count_text(item.counts.censored) if metric.limit is not None else NO_VALUE,
         count_text(item.counts.missing),
     )
     return (Cell(metric_title(metric)), Cell(item.method), *(Cell(text, is_number=True) for text in texts))
@@ -332,11 +340,11 @@ def comparison_table(content: ReportContent, component: str) -> Table:
     )
     notes = [f"{title}: {'; '.join(texts)}." for title, texts in (("Tests", tests), ("Intervals", intervals)) if texts]
     notes += dict.fromkeys(
-        f"{words(item.metric)}, {item.first} and {item.second}: {note}" for item in items for note in item.notes
+        f"{spaced_words(item.metric)}, {item.first} and {item.second}: {note}" for item in items for note in item.notes
     )
     return Table(
         f"comparisons_{component}",
-        f"Pairs of methods by the metrics of {words(component)}.",
+        f"Pairs of methods by the metrics of {spaced_words(component)}.",
         columns,
         rows,
         tuple(notes),
@@ -353,7 +361,7 @@ def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
             result = Cell("no difference shown" + (f"; {item.pairs_needed:,} pairs would" if item.pairs_needed else ""))
         case Verdict.NOT_SHOWABLE:
             needed = f"; {item.pairs_needed:,} pairs would" if item.pairs_needed else ""
-            result = Cell(f"could not be shown with {counted(item.counts.units, item.unit_noun)}{needed}")
+            result = Cell(f"could not be shown with {count_phrase(item.counts.units, item.unit_noun)}{needed}")
         case Verdict.NO_DATA:
             result = Cell("nothing to compare")
     texts = (
@@ -386,8 +394,8 @@ def missing_table(content: ReportContent) -> Table:
                     Cell(text, is_number=True)
                     for text in (
                         count_text(counts.episodes), count_text(counts.counted - counts.censored),
-                        count_text(counts.censored) if limit else NONE, count_text(counts.missing),
-                        percentage_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NONE,
+                        count_text(counts.censored) if limit else NO_VALUE, count_text(counts.missing),
+                        percentage_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NO_VALUE,
                     )
                 ),
             ))  # fmt: skip

@@ -12,13 +12,13 @@ import plotly.graph_objects as go
 from modular_framework_benchmark.reports.figure_style import (
     FAILED,
     NamedFigure,
+    apply_style,
     color_of,
     dash_of,
-    label,
+    label_text,
+    spaced_words,
     stacked_bars,
-    styled,
     unique_labels,
-    words,
 )
 from modular_framework_benchmark.reports.number_text import number_text
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary
@@ -45,15 +45,15 @@ def components_figure(summaries: Sequence[SpanSummary], methods: Sequence[str]) 
         return None
     names = list(dict.fromkeys(item.name for item in components))
     labels = unique_labels(methods)
-    found = {(item.name, item.method): item.per_episode_s for item in components}
+    time_of = {(item.name, item.method): item.per_episode_s for item in components}
     figure = go.Figure(
         [
             go.Bar(
-                x=[found.get((name, method), 0.0) for method in methods], y=labels, orientation="h", width=0.5,
-                name=label(words(name)), marker={"color": STATE_COLORS[index % len(STATE_COLORS)]},
-                text=[f"{number_text(found.get((name, method), 0.0))} s" for method in methods],
+                x=[time_of.get((name, method), 0.0) for method in methods], y=labels, orientation="h", width=0.5,
+                name=label_text(spaced_words(name)), marker={"color": STATE_COLORS[index % len(STATE_COLORS)]},
+                text=[f"{number_text(time_of.get((name, method), 0.0))} s" for method in methods],
                 textposition="inside", insidetextanchor="middle", textangle=0,
-                hovertemplate=f"{label(name)}: %{{x:.3g}} s<extra></extra>",
+                hovertemplate=f"{label_text(name)}: %{{x:.3g}} s<extra></extra>",
             )
             for index, name in enumerate(names)
         ]
@@ -81,7 +81,7 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
     states = list(dict.fromkeys(name for rows in of_episode.values() for name in _leaves(rows)["name"]))
     colors = {name: STATE_COLORS[index % len(STATE_COLORS)] for index, name in enumerate(states)}
     figure = go.Figure()
-    shown: set[str] = set()
+    shown_names: set[str] = set()
     for row, item in enumerate(episodes):
         for span in _leaves(of_episode[item.number]).to_dict("records"):
             _add_span(
@@ -90,15 +90,15 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
                 y=row - 0.12,
                 width=0.44,
                 color=colors[span["name"]],
-                in_legend=str(span["name"]) not in shown,
+                in_legend=str(span["name"]) not in shown_names,
             )
-            shown.add(str(span["name"]))
+            shown_names.add(str(span["name"]))
         for span in _components(of_episode[item.number]).to_dict("records"):
             _add_span(figure, span, y=row + 0.24, width=0.14, color="#5f6c7b", in_legend=False)
-    styled(figure, height=150 + 52 * len(episodes))
+    apply_style(figure, height=150 + 52 * len(episodes))
     figure.update_layout(barmode="overlay")
     labels = [
-        f"{label(item.method, 24)}<br>no. {item.number}, {words(item.status.value)}"
+        f"{label_text(item.method, 24)}<br>no. {item.number}, {spaced_words(item.status.value)}"
         + (", cold start" if item.started_cold else "")
         for item in episodes
     ]
@@ -137,7 +137,7 @@ def _add_span(
     unended = ended is None or not np.isfinite(float(str(ended)))
     length = 0.5 if unended else float(str(ended)) - started
     failed = bool(span["failed"]) or unended
-    name, reason = label(str(span["name"]).strip("/")), label(str(span["reason"] or ""), 120)
+    name, reason = label_text(str(span["name"]).strip("/")), label_text(str(span["reason"] or ""), 120)
     end = "never ended" if unended else f"{number_text(length)} s"
     figure.add_trace(
         go.Bar(
@@ -175,7 +175,7 @@ def progress_figure(episodes: pd.DataFrame, planned: int) -> NamedFigure | None:
         )
     )  # fmt: skip
     figure.add_hline(y=planned, line={"color": "#5f6c7b", "dash": "dot", "width": 1})
-    styled(figure, height=260)
+    apply_style(figure, height=260)
     figure.update_xaxes(title_text=f"time since the start of the first episode [{unit}]", rangemode="tozero")
     figure.update_yaxes(title_text="finished episodes", range=[0, 1.06 * planned], tickformat=",d")
     return NamedFigure(

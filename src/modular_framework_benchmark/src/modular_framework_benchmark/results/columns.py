@@ -24,8 +24,8 @@ def check_names(description: ExperimentDescription) -> None:
     """
     factors = [factor.name.lower() for factor in description.factors]
     faults = _metric_faults(description.metrics)
-    taken = {metric.name.lower() for metric in description.metrics} | RESULT_COLUMNS | {SUCCESS}
-    faults += [f"factor {each!r}: the name is taken" for each in factors if each in taken]
+    taken_names = {metric.name.lower() for metric in description.metrics} | RESULT_COLUMNS | {SUCCESS}
+    faults += [f"factor {each!r}: the name is taken" for each in factors if each in taken_names]
     faults += [f"factor {each!r} is there twice" for each in sorted(set(factors)) if factors.count(each) > 1]
     if description.compared not in {factor.name for factor in description.factors}:
         faults.append(f"compared factor {description.compared!r}: allowed: {', '.join(factors) or 'none'}")
@@ -39,16 +39,16 @@ def check_names(description: ExperimentDescription) -> None:
 
 def _metric_faults(metrics: Sequence[Metric]) -> list[str]:
     faults: list[str] = []
-    taken = set(RESULT_COLUMNS | ARENA_COLUMNS)
+    taken_names = set(RESULT_COLUMNS | ARENA_COLUMNS)
     for metric in metrics:
         lower = metric.name.lower()
         if not metric.name.isidentifier():
             faults.append(f"metric {metric.name!r} is not an identifier, such as planning_time")
-        elif lower in taken:
+        elif lower in taken_names:
             faults.append(f"metric {metric.name!r}: the name is taken")
         elif lower == SUCCESS and (metric.name != SUCCESS or metric.kind is not MetricKind.RATE):
             faults.append(f"metric {metric.name!r}: `success` is a rate, in lower case")
-        taken.add(lower)
+        taken_names.add(lower)
     return faults
 
 
@@ -88,21 +88,21 @@ def factor_columns(connection: Connection, description: ExperimentDescription) -
         Column name of each factor, keyed by factor name.
     """
     present = {each["name"].lower(): each for each in inspect(connection).get_columns(EXPERIMENTS.name)}
-    taken = {column.name for column in EXPERIMENTS.columns} | {"experiment", "planner"}
+    taken_names = {column.name for column in EXPERIMENTS.columns} | {"experiment", "planner"}
     columns: dict[str, str] = {}
     for factor in description.factors:
         if factor.name == description.compared:
             continue
         name = factor.name
         numbers = is_numeric(factor)
-        while name.lower() in taken or (
+        while name.lower() in taken_names or (
             name.lower() in present and isinstance(present[name.lower()]["type"], String) is numbers
         ):
             name += "_level"
         if name.lower() not in present:
             column = Column(name, REAL_NUMBER) if numbers else Column(name, String(512))
             _add_column(connection, EXPERIMENTS.name, column)
-        taken.add(name.lower())
+        taken_names.add(name.lower())
         columns[factor.name] = name
     return columns
 

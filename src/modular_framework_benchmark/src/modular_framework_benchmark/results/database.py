@@ -212,13 +212,13 @@ class ResultDatabase:
             UnknownExperimentError: The database has no experiment of this name; the error lists the known names.
         """
         with self._reading() as connection:
-            known = dict(connection.execute(select(DESCRIPTIONS.c.name, DESCRIPTIONS.c.id)).all())
-        if name not in known:
+            ids = dict(connection.execute(select(DESCRIPTIONS.c.name, DESCRIPTIONS.c.id)).all())
+        if name not in ids:
             raise UnknownExperimentError(
-                f"{self.label} has no experiment {name!r}; allowed: {', '.join(sorted(known)) or 'none, it is empty'}"
-                + nearest(name, known)
+                f"{self.label} has no experiment {name!r}; allowed: {', '.join(sorted(ids)) or 'none, it is empty'}"
+                + nearest(name, ids)
             )
-        return int(known[name])
+        return int(ids[name])
 
     def check_resumed(self, number: int, ran_with: Mapping[str, str]) -> None:
         """Checks that the remaining episodes run with the files, packages and parameters of the finished episodes.
@@ -384,10 +384,10 @@ class ResultDatabase:
         if self._address.path is None:
             return
         with self._reading() as connection:
-            found = " ".join(connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one().split())
-        if found != "ok":
+            result = " ".join(connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one().split())
+        if result != "ok":
             raise DatabaseCorruptError(
-                f"{self.label}: it is damaged ({found}); restore a copy, or recover its data with sqlite3 .recover"
+                f"{self.label}: it is damaged ({result}); restore a copy, or recover its data with sqlite3 .recover"
             )
 
     def _import_waiting(self) -> None:

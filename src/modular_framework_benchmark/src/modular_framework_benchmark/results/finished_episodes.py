@@ -135,11 +135,11 @@ def _snapshot_value(connection: Connection, name: str, value: Any) -> int:
     text = to_json(value)
     digest = hashlib.sha256(text.encode()).hexdigest()
     columns = SNAPSHOT_VALUES.c
-    known = connection.execute(
+    stored_value = connection.execute(
         select(columns.id).where(columns.name == name, columns.digest == digest)
     ).scalar_one_or_none()
-    if known is not None:
-        return int(known)
+    if stored_value is not None:
+        return int(stored_value)
     row = insert(SNAPSHOT_VALUES).values(name=name, digest=digest, value=text)
     return insert_row(connection, row)
 
@@ -178,15 +178,15 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
     run = connection.execute(select(runs).where(runs.c.id == row.id)).mappings().one_or_none()
     if run is None:
         return None
-    rest = connection.execute(select(RECORDS).where(RECORDS.c.runid == row.id)).one()
+    record_row = connection.execute(select(RECORDS).where(RECORDS.c.runid == row.id)).one()
     spans = connection.execute(select(SPANS).where(SPANS.c.runid == row.id).order_by(SPANS.c.place))
     status = next(each for each, value in STATUS_VALUES.items() if value == run["status"])
     return EpisodeRecord(
         spec=read_spec(row, description.mode),
         status=status,
-        outcome=rest.outcome,
-        cause=rest.cause,
-        begun=rest.begun,
+        outcome=record_row.outcome,
+        cause=record_row.cause,
+        begun=record_row.begun,
         wall_s=run["wall_s"],
         simulated_s=run["simulated_s"],
         metrics={name: None if run[name] is None else float(run[name]) for name in names},
@@ -202,9 +202,9 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
             )
             for each in spans
         ),
-        snapshot=_read_snapshot(connection, json.loads(rest.snapshot)),
-        folder=rest.folder,
-        worker=rest.worker,
+        snapshot=_read_snapshot(connection, json.loads(record_row.snapshot)),
+        folder=record_row.folder,
+        worker=record_row.worker,
     )
 
 

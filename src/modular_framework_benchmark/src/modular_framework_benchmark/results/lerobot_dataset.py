@@ -99,20 +99,20 @@ class LeRobotWriter:
         """
         self._check_features(frames, videos)
         row: dict[str, Any] = {"episode_index": self.episodes, "tasks": [task], "length": frames.count}
-        found: dict[str, FeatureStatistics] = {}
+        statistics: dict[str, FeatureStatistics] = {}
         for camera, path in videos.items():
             key = f"{IMAGES}{camera}"
             location = self._cameras[key].add(path, frames.started_s, frames.count)
-            found[key] = image_statistics(location.samples)
+            statistics[key] = image_statistics(location.samples)
             row |= {f"videos/{key}/chunk_index": location.chunk, f"videos/{key}/file_index": location.file}
             row |= {f"videos/{key}/from_timestamp": location.from_s, f"videos/{key}/to_timestamp": location.to_s}
         scalars = self._scalars(frames.count, self._tasks.setdefault(task, len(self._tasks)), succeeded)
-        found |= {name: feature_statistics(values) for name, values in (frames.values | scalars).items()}
+        statistics |= {name: feature_statistics(values) for name, values in (frames.values | scalars).items()}
         self._write_data(frames, scalars)
         row |= {"data/chunk_index": self._file // FILES_PER_CHUNK, "data/file_index": self._file % FILES_PER_CHUNK}
         row |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + frames.count}
         row |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
-        for feature, values in found.items():
+        for feature, values in statistics.items():
             self._statistics.setdefault(feature, []).append(values)
             row |= {f"stats/{feature}/{name}": value.tolist() for name, value in values.items()}
         self._episodes.append(row)
@@ -144,8 +144,9 @@ class LeRobotWriter:
         cameras = {f"{IMAGES}{camera}" for camera in videos}
         if frames.names != self._names or cameras != set(self._cameras):
             raise ExportError(
-                f"it has {_listed(frames.names, cameras)}; allowed, as in the first episode: "
-                f"{_listed(self._names, set(self._cameras))}; export the episodes of each robot and camera separately"
+                f"it has {_features_text(frames.names, cameras)}; allowed, as in the first episode: "
+                f"{_features_text(self._names, set(self._cameras))}; export the episodes of each robot "
+                "and camera separately"
             )
 
     def _scalars(self, count: int, task: int, succeeded: bool) -> dict[str, NDArray[Any]]:
@@ -228,6 +229,6 @@ class LeRobotWriter:
         (self._root / "meta" / name).write_text(json.dumps(content, indent=2), encoding="utf-8")
 
 
-def _listed(names: dict[str, tuple[str, ...]], cameras: set[str]) -> str:
+def _features_text(names: dict[str, tuple[str, ...]], cameras: set[str]) -> str:
     texts = [f"{feature} of {', '.join(parts)}" for feature, parts in sorted(names.items())]
     return "; ".join([*texts, f"cameras {', '.join(sorted(cameras)) or 'none'}"])

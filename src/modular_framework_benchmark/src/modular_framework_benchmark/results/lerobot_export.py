@@ -70,7 +70,7 @@ def export_lerobot(
                 continue
             writer = writer or LeRobotWriter(folder, frames_per_second, robot_of(database, record))
             try:
-                _add(writer, database, record, frames_per_second)
+                _add_episode(writer, database, record, frames_per_second)
             except ExportError as error:
                 skipped[record.spec.number] = str(error)
     except OSError as error:
@@ -84,7 +84,9 @@ def export_lerobot(
     return LeRobotSummary(writer.episodes, writer.frames, skipped)
 
 
-def _add(writer: LeRobotWriter, database: ResultDatabase, record: EpisodeRecord, frames_per_second: int) -> None:
+def _add_episode(
+    writer: LeRobotWriter, database: ResultDatabase, record: EpisodeRecord, frames_per_second: int
+) -> None:
     if not record.folder:
         raise ExportError("its files were not recorded; run it with recording")
     folder = database.folder / record.folder

@@ -74,13 +74,13 @@ def read_frames(path: Path, frames_per_second: int) -> EpisodeFrames:
     names: dict[str, list[str]] = {}
     for name, samples in columns.items():
         feature, part = _feature_of(name)
-        known = np.isfinite(samples)
-        if not feature or not known.any():
+        is_known = np.isfinite(samples)
+        if not feature or not is_known.any():
             continue
         if feature == ACTION:
             frames = _held_commands(times, samples, columns.get(f"{part}/position"), times_s)
         else:
-            frames = np.interp(times_s, times[known], samples[known])
+            frames = np.interp(times_s, times[is_known], samples[is_known])
         values.setdefault(feature, []).append(frames)
         names.setdefault(feature, []).append(part)
     missing = {STATE, ACTION} - set(values)
@@ -126,9 +126,9 @@ def _held_commands(
     positions: NDArray[np.float64] | None,
     times_s: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    known = np.isfinite(commands)
-    first = int(np.argmax(known))
-    last = np.maximum.accumulate(np.where(known, np.arange(len(commands)), 0))
+    is_known = np.isfinite(commands)
+    first = int(np.argmax(is_known))
+    last = np.maximum.accumulate(np.where(is_known, np.arange(len(commands)), 0))
     held = commands[last]
     if positions is not None:
         held[:first] = positions[:first]

@@ -156,13 +156,13 @@ def frames_at(source: Path, times_s: NDArray[np.float64]) -> Iterator[NDArray[np
     try:
         with av.open(str(source)) as container:
             decoded = container.decode(video=0)
-            shown = next(decoded, None)
-            if shown is None:
+            frame = next(decoded, None)
+            if frame is None:
                 raise ExportError(f"{source}: has no frames; record the episode again")
             following = next(decoded, None)
             for moment in times_s:
                 while following is not None and float(following.time or 0.0) <= moment + 1e-6:
-                    shown, following = following, next(decoded, None)
-                yield np.asarray(shown.to_ndarray(format="rgb24"), dtype=np.uint8)
+                    frame, following = following, next(decoded, None)
+                yield np.asarray(frame.to_ndarray(format="rgb24"), dtype=np.uint8)
     except (FFmpegError, IndexError) as error:
         raise ExportError(f"{source}: not a readable video ({error}); record the episode again") from error

@@ -17,7 +17,7 @@ from sqlalchemy import Connection, RowMapping, column, func, insert, select, tab
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription
-from modular_framework_benchmark.records.level_digests import ABSENT, FILE, combination_key, digests_of
+from modular_framework_benchmark.records.level_digests import ABSENT_DIGEST, FILE_PREFIX, combination_key, digests_of
 from modular_framework_benchmark.results.columns import (
     add_metric_columns,
     check_names,
@@ -97,15 +97,15 @@ def _check_extended(
     if old.ran_with and new.ran_with:
         keys = _stored_combinations(connection, number)
         changed = [
-            name for name in {**old.ran_with, **new.ran_with} if any(_changed(old, new, name, key) for key in keys)
+            name for name in {**old.ran_with, **new.ran_with} if any(_has_changed(old, new, name, key) for key in keys)
         ]
         _refuse_changed(new.name, changed)
 
 
-def _changed(old: ExperimentDescription, new: ExperimentDescription, name: str, combination: str) -> bool:
+def _has_changed(old: ExperimentDescription, new: ExperimentDescription, name: str, combination: str) -> bool:
     """Returns whether a combination lacks digests that it had, or uses content that it did not use."""
-    had, has = (digests_of(side.ran_with.get(name, ABSENT), combination) for side in (old, new))
-    return not had <= has or bool(has and not had and not name.startswith(FILE))
+    had, has = (digests_of(side.ran_with.get(name, ABSENT_DIGEST), combination) for side in (old, new))
+    return not had <= has or bool(has and not had and not name.startswith(FILE_PREFIX))
 
 
 def _stored_combinations(connection: Connection, number: int) -> list[str]:
@@ -130,7 +130,7 @@ def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str], pe
         changed = [
             name
             for name, digests in ran_with.items()
-            if any(digests_of(digests, key) - digests_of(stored.ran_with.get(name, ABSENT), key) for key in keys)
+            if any(digests_of(digests, key) - digests_of(stored.ran_with.get(name, ABSENT_DIGEST), key) for key in keys)
         ]
         _refuse_changed(stored.name, changed)
 
@@ -273,16 +273,16 @@ def _insert_methods(
     shared: dict[str, dict[str, Any]] = {}
     for spec in all_specs.values():
         settings = as_json(spec.settings)
-        known = shared.setdefault(spec.configuration[description.compared], dict(settings))
-        for name in [each for each, value in known.items() if settings.get(each) != value]:
-            del known[name]
+        known_settings = shared.setdefault(spec.configuration[description.compared], dict(settings))
+        for name in [each for each, value in known_settings.items() if settings.get(each) != value]:
+            del known_settings[name]
     for level in sorted(set(shared) - set(methods)):
         values = {"name": level, "settings": to_json(shared[level])}
         columns = PLANNER_CONFIGS.c
-        same = connection.execute(
+        same_planner = connection.execute(
             select(columns.id).where(columns.name == level, columns.settings == values["settings"])
         ).scalar_one_or_none()
-        methods[level] = same or insert_row(connection, insert(PLANNER_CONFIGS).values(values))
+        methods[level] = same_planner or insert_row(connection, insert(PLANNER_CONFIGS).values(values))
 
 
 def _insert_conditions(
@@ -294,14 +294,14 @@ def _insert_conditions(
     """Inserts each combination of the other factors' levels as an experiment of Planner Arena with parameters."""
     names = factor_columns(connection, description)
     others = [factor for factor in description.factors if factor.name != description.compared]
-    wanted = {_condition(description, spec.configuration): 0 for spec in all_specs.values()}
+    wanted_conditions = {_condition(description, spec.configuration): 0 for spec in all_specs.values()}
     per_method: dict[tuple[str, tuple[str, ...]], int] = {}
     for spec in all_specs.values():
         pair = (spec.configuration[description.compared], _condition(description, spec.configuration))
         per_method[pair] = per_method.get(pair, 0) + 1
     for (_, condition), count in per_method.items():
-        wanted[condition] = max(wanted[condition], count)
-    for condition, count in wanted.items():
+        wanted_conditions[condition] = max(wanted_conditions[condition], count)
+    for condition, count in wanted_conditions.items():
         if condition in conditions:
             connection.execute(
                 update(EXPERIMENTS).where(EXPERIMENTS.c.id == conditions[condition]).values(runcount=count)

@@ -190,14 +190,16 @@ def _values_by_combination(
     )
     used = set[int]().union(*counts.values())
     values = [(each.id, each.name, json.loads(each.value)) for each in stored if each.id in used]
-    found: dict[str, dict[str, list[tuple[Any, int]]]] = {}
+    values_by_combination: dict[str, dict[str, list[tuple[Any, int]]]] = {}
     for combination, of_combination in sorted(counts.items()):
         parts: dict[str, list[tuple[Any, int]]] = {}
         for key, name, value in values:
             if key in of_combination:
                 parts.setdefault(name, []).append((value, of_combination[key]))
-        found[combination] = {name: sorted(parts[name], key=lambda each: -each[1]) for name in sorted(parts)}
-    return found
+        values_by_combination[combination] = {
+            name: sorted(parts[name], key=lambda each: -each[1]) for name in sorted(parts)
+        }
+    return values_by_combination
 
 
 def _combination_text(configuration: str) -> str:
@@ -234,8 +236,8 @@ def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, A
 
 
 def _levels(configurations: tuple[str, ...], description: ExperimentDescription) -> dict[str, Any]:
-    known = {text: json.loads(text) for text in set(configurations)}
+    levels_of_text = {text: json.loads(text) for text in set(configurations)}
     return {
-        factor.name: pd.Series([known[text][factor.name] for text in configurations], dtype="str")
+        factor.name: pd.Series([levels_of_text[text][factor.name] for text in configurations], dtype="str")
         for factor in description.factors
     }

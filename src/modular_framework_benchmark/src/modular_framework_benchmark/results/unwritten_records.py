@@ -46,9 +46,9 @@ def waiting_folders(address: DatabaseAddress) -> list[Path]:
     """
     mark = hashlib.sha256(address.identity.encode()).hexdigest()[:16]
     ros_home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
-    others = [ros_home, Path(tempfile.gettempdir())]
+    other_folders = [ros_home, Path(tempfile.gettempdir())]
     beside = [address.path.with_name(f"{address.path.name}.unwritten")] if address.path else []
-    return beside + [folder / "modular_framework_benchmark" / "unwritten" / mark for folder in others]
+    return beside + [folder / "modular_framework_benchmark" / "unwritten" / mark for folder in other_folders]
 
 
 def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord) -> Path | None:
@@ -80,10 +80,10 @@ def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord
 
 def _require_own(path: Path) -> None:
     """Raises PermissionError unless the user owns the path and no other user may write it."""
-    found = path.lstat()
-    if stat.S_ISLNK(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o022:
+    status = path.lstat()
+    if stat.S_ISLNK(status.st_mode) or status.st_uid != os.geteuid() or status.st_mode & 0o022:
         raise PermissionError(
-            errno.EPERM, f"other users may write it ({stat.filemode(found.st_mode)}, user {found.st_uid})", str(path)
+            errno.EPERM, f"other users may write it ({stat.filemode(status.st_mode)}, user {status.st_uid})", str(path)
         )
 
 

@@ -50,12 +50,12 @@ class DaskPool:
             ) from error
         self._futures: dict[Any, tuple[str, EpisodeSpec, float]] = {}
 
-    def free(self) -> list[str]:
+    def free_slots(self) -> list[str]:
         """Returns the slots without a task as WORKER_ADDRESS#NUMBER."""
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
         slots = [f"{address}#{number}" for address, info in workers.items() for number in range(info["nthreads"])]
-        taken = {slot for slot, _, _ in self._futures.values()}
-        free = [slot for slot in slots if slot not in taken]
+        taken_slots = {slot for slot, _, _ in self._futures.values()}
+        free = [slot for slot in slots if slot not in taken_slots]
         return free[: max(0, len(slots) - len(self._futures))]
 
     def submit(self, slot: str, spec: EpisodeSpec, folder: Path) -> None:
@@ -136,7 +136,7 @@ def run_task(make_runner: RunnerFactory, run: str, logs: Path, spec: EpisodeSpec
         prefix = f"dask_{name}_{len(_pools)}_"
         pool = _pools[identity] = LocalPool(make_runner, 1, run, logs, prefix)
     try:
-        pool.submit(pool.free()[0], spec, folder)
+        pool.submit(pool.free_slots()[0], spec, folder)
         while _is_wanted(worker, key):
             records = pool.wait(POLL_S)
             if records:
@@ -155,5 +155,5 @@ def _is_wanted(worker: Any, key: str) -> bool:
 
 def close_runners(run: str) -> None:
     """Ends the idle processes of a run in a Dask worker."""
-    for identity in [known for known in _pools if known[0] == run]:
+    for identity in [key for key in _pools if key[0] == run]:
         _pools.pop(identity).close()

@@ -26,7 +26,7 @@ class DiskGuard:
         sizes = [tree_size(each) for each in folder.iterdir()] if folder.is_dir() else []
         self._used, self._largest = sum(sizes), max(sizes, default=0)
 
-    def ended(self, folder: Path) -> None:
+    def add_episode(self, folder: Path) -> None:
         """Adds the files of an ended episode to the used space."""
         size = tree_size(folder)
         self._used += size
@@ -44,10 +44,10 @@ class DiskGuard:
                 f"the next episode would exceed --disk-limit {self._limit_bytes / GB:g}: {self._folder} has "
                 f"{self._used / GB:.3g} GB"
             )
-        there = next(path for path in (self._folder, *self._folder.parents) if path.is_dir())
-        free = shutil.disk_usage(there).free
+        existing_folder = next(path for path in (self._folder, *self._folder.parents) if path.is_dir())
+        free = shutil.disk_usage(existing_folder).free
         if free - expected < self._min_free_bytes:
-            return f"the disk of {there} is almost full: {free / GB:.3g} GB free"
+            return f"the disk of {existing_folder} is almost full: {free / GB:.3g} GB free"
         return ""
 
 

@@ -19,13 +19,13 @@ def begin_try(folder: Path) -> list[str]:
     """
     earlier = _notes(folder).read_text(encoding="utf-8").splitlines() if _notes(folder).is_file() else []
     now = datetime.datetime.now(datetime.UTC).isoformat(" ", "seconds")
-    _add(folder, f"\nbegun {now} on {platform.node()}")
+    _append_note(folder, f"\nbegun {now} on {platform.node()}")
     return [text for text in earlier if text]
 
 
 def end_try(folder: Path, cause: str) -> None:
     """Logs why the latest attempt ended without a record."""
-    _add(folder, f": {' '.join(cause.split())}")
+    _append_note(folder, f": {' '.join(cause.split())}")
 
 
 def forget_tries(folder: Path) -> None:
@@ -37,6 +37,6 @@ def _notes(folder: Path) -> Path:
     return folder.with_name(f"{folder.name}.tries")
 
 
-def _add(folder: Path, text: str) -> None:
+def _append_note(folder: Path, text: str) -> None:
     with _notes(folder).open("a", encoding="utf-8") as stream:
         stream.write(text)

@@ -46,7 +46,7 @@ class TrialWatch:
         self._is_due = rule is not None  # the results of an earlier run may already be sufficient
         self._next_time = 0.0
 
-    def ended(self, spec: EpisodeSpec) -> None:
+    def count_episode(self, spec: EpisodeSpec) -> None:
         """Counts an ended episode."""
         self._remaining[spec.trial] -= 1
         self._is_due = self._is_due or self._remaining[spec.trial] == 0
@@ -192,11 +192,11 @@ class ExperimentRun:
             pool.close()
         finally:
             pool.kill()
-        return RunEnd(progress.ended, reason, self._disk_full) if len(queue) else RunEnd(progress.ended)
+        return RunEnd(progress.ended_count, reason, self._disk_full) if len(queue) else RunEnd(progress.ended_count)
 
     def _fill(self, pool: Pool, queue: EpisodeQueue, running: int) -> int:
         """Submits an episode to each suitable free slot while the disk has space; returns the running episodes."""
-        for slot in pool.free():
+        for slot in pool.free_slots():
             self._disk_full = self._disk_full or self._disk.reason_to_stop(running)
             if self._disk_full:
                 break
@@ -211,14 +211,14 @@ class ExperimentRun:
 
     def _store(self, record: EpisodeRecord) -> None:
         folder = self._folder_of(record.spec)
-        self._disk.ended(folder)
+        self._disk.add_episode(folder)
         has_files = folder.is_dir() and any(folder.iterdir())
         if folder.is_dir() and not has_files:
             folder.rmdir()
         relative = str(folder.relative_to(self._database.folder)) if has_files else ""
         self._database.write(self._experiment, dataclasses.replace(record, folder=relative))
         forget_tries(folder)
-        self._watch.ended(record.spec)
+        self._watch.count_episode(record.spec)
 
     def _results(self) -> ExperimentResults:
         return self._database.load(self._experiment, spans=False)

@@ -28,7 +28,7 @@ class SchedulerError(Exception):
 class Pool(Protocol):
     """Runs episodes on workers with one or several slots each."""
 
-    def free(self) -> list[str]:
+    def free_slots(self) -> list[str]:
         """Returns the free slots."""
 
     def submit(self, slot: str, spec: EpisodeSpec, folder: Path) -> None:
@@ -66,7 +66,7 @@ class LocalPool:
         self._workers: dict[str, WorkerProcess | None] = {f"{prefix}{number + 1}": None for number in range(workers)}
         self._ready: set[str] = set()
 
-    def free(self) -> list[str]:
+    def free_slots(self) -> list[str]:
         """Returns the names of the idle workers."""
         return [name for name, worker in self._workers.items() if worker is None or worker.running is None]
 
@@ -127,7 +127,7 @@ class LocalPool:
         if running.tries < MAX_TRIES:
             self._start_episode(worker.name, running.spec, running.folder, running.tries + 1)
             return None
-        return self._unrun(running, worker, EpisodeStatus.BROKEN, f"{cause} (after {running.tries} attempts)")
+        return self._unrun_record(running, worker, EpisodeStatus.BROKEN, f"{cause} (after {running.tries} attempts)")
 
     def _kill_overdue(self, worker: WorkerProcess) -> EpisodeRecord | None:
         running = worker.running
@@ -137,9 +137,11 @@ class LocalPool:
             return None
         self._end(worker)
         cause = f"the runner exceeded {limit_s:g} s, the time limit plus {GRACE_S:g} s; it was killed"
-        return self._unrun(running, worker, EpisodeStatus.TIMED_OUT, cause)
+        return self._unrun_record(running, worker, EpisodeStatus.TIMED_OUT, cause)
 
-    def _unrun(self, running: Running, worker: WorkerProcess, status: EpisodeStatus, cause: str) -> EpisodeRecord:
+    def _unrun_record(
+        self, running: Running, worker: WorkerProcess, status: EpisodeStatus, cause: str
+    ) -> EpisodeRecord:
         wall_s = time.monotonic() - running.started
         return unrun_record(running.spec, status, cause, begun=running.begun, wall_s=wall_s, worker=worker.name)
 

@@ -7,7 +7,7 @@ its environment, which all its descendants inherit.
 
 from __future__ import annotations
 
-from modular_framework_benchmark.episodes.snapshot import RUN_MARK as MARK
+from modular_framework_benchmark.episodes.snapshot import RUN_ID_VARIABLE as MARK
 from modular_framework_core.launching.launch_session import kill_processes_with, processes_with
 
 __all__ = ["MARK", "end_marked_processes", "marked_processes"]

@@ -40,7 +40,7 @@ class Progress:
         self._is_terminal = stream.isatty()
 
     @property
-    def ended(self) -> int:
+    def ended_count(self) -> int:
         """Returns the number of episodes that ended in this run."""
         return sum(self._counts.values())
 
@@ -49,9 +49,9 @@ class Progress:
         self._counts[record.status] += 1
         episode = f"episode {record.spec.number} ({record.spec.key})"
         if record.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID):
-            self._line(f"{episode} is {STATUS_WORDS[record.status]}: {record.cause}")
+            self._write_line(f"{episode} is {STATUS_WORDS[record.status]}: {record.cause}")
         elif record.snapshot.get(EARLIER_TRIES):
-            self._line(
+            self._write_line(
                 f"{episode} was repeated after attempts without a record: {'; '.join(record.snapshot[EARLIER_TRIES])}"
             )
         self.show()
@@ -68,7 +68,7 @@ class Progress:
             return
         self._shown = time_s
         if self._is_terminal:
-            self._stream.write(f"\r{self._bar()} {self.text()}"[: _columns(self._stream)] + "\033[K")
+            self._stream.write(f"\r{self._bar_text()} {self.text()}"[: _columns(self._stream)] + "\033[K")
         else:
             self._stream.write(f"{self.text()}\n")
         self._stream.flush()
@@ -82,25 +82,25 @@ class Progress:
 
     def text(self) -> str:
         """Returns the counts and the remaining time as text."""
-        done = self._before + self.ended
+        ended = self._before + self.ended_count
         counts = ", ".join(f"{self._counts[status]} {word}" for status, word in STATUS_WORDS.items())
         before = f" ({self._before} before)" if self._before else ""
-        return f"{done} of {self._total} episodes{before}: {counts}; {self._remaining_time(self._total - done)}"
+        return f"{ended} of {self._total} episodes{before}: {counts}; {self._remaining_time(self._total - ended)}"
 
     def _remaining_time(self, remaining: int) -> str:
         if remaining <= 0:
             return "done"
-        if self.ended == 0:
+        if self.ended_count == 0:
             return "remaining time unknown"
-        seconds = (self._clock() - self._start) / self.ended * remaining
+        seconds = (self._clock() - self._start) / self.ended_count * remaining
         hours, rest = divmod(round(seconds), 3600)
         return f"about {hours}:{rest // 60:02}:{rest % 60:02} remaining"
 
-    def _bar(self) -> str:
-        filled = BAR_WIDTH * (self._before + self.ended) // max(self._total, 1)
+    def _bar_text(self) -> str:
+        filled = BAR_WIDTH * (self._before + self.ended_count) // max(self._total, 1)
         return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"
 
-    def _line(self, text: str) -> None:
+    def _write_line(self, text: str) -> None:
         self._stream.write(f"\r\033[K{text}\n" if self._is_terminal else f"{text}\n")
 
 

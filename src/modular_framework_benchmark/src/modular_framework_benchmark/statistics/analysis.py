@@ -22,11 +22,11 @@ from modular_framework_benchmark.statistics.observations import (
     metrics_of,
     other_factors,
     pairs_of_methods,
-    restricted,
+    restrict_results,
     unmeasured_reason,
 )
 from modular_framework_benchmark.statistics.summaries import summarise_method
-from modular_framework_benchmark.statistics.verdicts import Correction, conclude
+from modular_framework_benchmark.statistics.verdicts import Correction, conclude_comparison
 
 
 def analyse(results: ExperimentResults, *, mean_intervals: bool = False) -> Analysis:
@@ -48,8 +48,8 @@ def analyse(results: ExperimentResults, *, mean_intervals: bool = False) -> Anal
         summaries=tuple(dataclasses.replace(item, estimate=None) for item in summaries) if unmeasured else summaries,
         comparisons=comparisons,
         sentences=(unmeasured,) if unmeasured else _main_sentences(results, comparisons),
-        rule=_rule(results, len(comparisons)),
-        scope=_scope(results),
+        rule=_rule_sentence(results, len(comparisons)),
+        scope=_scope_sentence(results),
     )
 
 
@@ -78,7 +78,7 @@ def summarise_by_level(results: ExperimentResults, factor: str) -> tuple[MethodS
     return tuple(
         summary
         for level in _levels(results, factor)
-        for summary in summarise(restricted(results, factor, level), f"{factor}={level}")
+        for summary in summarise(restrict_results(results, factor, level), f"{factor}={level}")
     )
 
 
@@ -92,28 +92,34 @@ def compare(results: ExperimentResults, *, mean_intervals: bool = False) -> tupl
         for first, second in pairs_of_methods(results)
     ]
     corrections = _corrections(findings, 1.0 - description.confidence)
-    return tuple(conclude(results, *each) for each in zip(findings, corrections, strict=True))
+    return tuple(conclude_comparison(results, *each) for each in zip(findings, corrections, strict=True))
 
 
 def _corrections(findings: Sequence[Finding], error_rate: float) -> list[Correction]:
     """Returns the multiplicity correction of each comparison, in the order of the findings."""
-    of_success = [found.metric.name == SUCCESS.name for found in findings]
-    p_values, levels = _corrected(findings, of_success, error_rate)
+    of_success = [finding.metric.name == SUCCESS.name for finding in findings]
+    p_values, levels = _corrected_p_values(findings, of_success, error_rate)
     without = p_values
-    if any(found.without_broken for found in findings):
-        without, _ = _corrected([found.without_broken or found for found in findings], of_success, error_rate)
+    if any(finding.without_broken for finding in findings):
+        without, _ = _corrected_p_values(
+            [finding.without_broken or finding for finding in findings], of_success, error_rate
+        )
     return [
         Correction(p_value, p_without, error_rate, level)
         for p_value, p_without, level in zip(p_values, without, levels, strict=True)
     ]
 
 
-def _corrected(
+def _corrected_p_values(
     findings: Sequence[Finding], of_success: Sequence[bool], error_rate: float
 ) -> tuple[list[float | None], list[float]]:
     """Returns the corrected p value and the level of the strictest Holm step of each comparison."""
     families = [
-        [index for index, found in enumerate(findings) if of_success[index] is is_success and found.p_value is not None]
+        [
+            index
+            for index, finding in enumerate(findings)
+            if of_success[index] is is_success and finding.p_value is not None
+        ]
         for is_success in (True, False)
     ]
     min_attainable = [min((findings[index].min_attainable_p for index in family), default=1.0) for family in families]
@@ -125,11 +131,11 @@ def _corrected(
             bar = error_rate / 2 if min_attainable[family_index] <= error_rate / 2 else error_rate
             fraction = 1.0 if min_attainable[1 - family_index] > bar else 0.5
             tested = [findings[index].p_value or 0.0 for index in family]
-            found, count = holm_tarone(
+            finding, count = holm_tarone(
                 tested, [findings[index].min_attainable_p for index in family], error_rate, fraction
             )
             levels[family_index] = error_rate * fraction / count
-            for index, p_value in zip(family, found, strict=True):
+            for index, p_value in zip(family, finding, strict=True):
                 p_values[index] = p_value
     return p_values, [levels[0 if success else 1] for success in of_success]
 
@@ -138,23 +144,23 @@ def _levels(results: ExperimentResults, name: str) -> tuple[str, ...]:
     for factor in other_factors(results):
         if factor.name == name:
             return factor.levels
-    known = ", ".join(factor.name for factor in other_factors(results)) or "none"
-    raise ValueError(f"'{name}' is not a factor besides the compared factor; allowed: {known}")
+    known_factors = ", ".join(factor.name for factor in other_factors(results)) or "none"
+    raise ValueError(f"'{name}' is not a factor besides the compared factor; allowed: {known_factors}")
 
 
 def _main_sentences(results: ExperimentResults, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
     """Returns the sentences on success, then the sentences on differences that are shown, then all others."""
     if not comparisons:
         return (f"nothing to compare: the only method is {', '.join(methods_of(results)) or 'none'}",)
-    shown = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
+    shown_verdicts = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
     ranked = sorted(
         enumerate(comparisons),
-        key=lambda item: (item[1].metric != SUCCESS.name, item[1].verdict not in shown, item[0]),
+        key=lambda item: (item[1].metric != SUCCESS.name, item[1].verdict not in shown_verdicts, item[0]),
     )
     return tuple(comparison.sentence for _, comparison in ranked)
 
 
-def _rule(results: ExperimentResults, comparisons: int) -> str:
+def _rule_sentence(results: ExperimentResults, comparisons: int) -> str:
     description = results.description
     error = f"{100 * (1 - description.confidence):g} %"
     when = "Tests hold for the planned number of episodes."
@@ -166,16 +172,16 @@ def _rule(results: ExperimentResults, comparisons: int) -> str:
         "A difference is shown if a method wins more pairs than it loses and test and interval both confirm this. A "
         f"failure is worse than any value; two failures tie. {when} With identical methods the experiment shows any "
         f"difference with a probability of at most {error}, half for success and half for all other metrics (Holm's "
-        f"and Tarone's correction, {sentences.count(comparisons, 'comparison')})."
+        f"and Tarone's correction, {sentences.quantity_text(comparisons, 'comparison')})."
     )
 
 
-def _scope(results: ExperimentResults) -> str:
+def _scope_sentence(results: ExperimentResults) -> str:
     """Returns the population that the claims cover: the units, their number and the fixed levels."""
     if results.episodes.empty:
         return ""
     table = EpisodeTable(results)
-    units = sentences.count(table.unit_count, table.unit_noun)
+    units = sentences.quantity_text(table.unit_count, table.unit_noun)
     levels = sentences.enumeration([factor.name.replace("_", " ") for factor in other_factors(results)])
     fixed = f", at the levels of {levels} that were run" if levels else ""
     trials = (

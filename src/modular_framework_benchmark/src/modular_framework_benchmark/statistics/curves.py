@@ -60,8 +60,8 @@ def performance_profile(
     """
     metric = _metric(results, metric_name)
     observed = EpisodeTable(results).observations(metric, method)
-    known = ~np.isnan(observed.scores)
-    scores, count = observed.scores[known], int(known.sum())
+    is_known = ~np.isnan(observed.scores)
+    scores, count = observed.scores[is_known], int(is_known.sum())
     grid = _grid(scores[np.isfinite(scores)]) if values is None else np.sort(np.asarray(values, dtype=float))
     confidence = results.description.confidence
     ordered = np.sort(scores)
@@ -69,7 +69,7 @@ def performance_profile(
         counts = np.searchsorted(ordered, grid, side="right")
     else:
         counts = count - np.searchsorted(ordered, grid, side="left")
-    units = len(np.unique(observed.units[known]))
+    units = len(np.unique(observed.units[is_known]))
     low, high = _band(counts * units / max(count, 1), units, confidence)
     return Curve(
         values=_floats(grid),
@@ -78,7 +78,7 @@ def performance_profile(
         high=high,
         confidence=confidence,
         episodes=count,
-        missing=int(np.sum(~known)),
+        missing=int(np.sum(~is_known)),
         method="fraction of episodes; Clopper-Pearson interval at each value for as many episodes as units",
     )
 
@@ -87,8 +87,8 @@ def _metric(results: ExperimentResults, name: str) -> Metric:
     for metric in metrics_of(results):
         if metric.name == name:
             return metric
-    known = ", ".join(metric.name for metric in metrics_of(results))
-    raise ValueError(f"metric '{name}' is not measured; the measured metrics are: {known}")
+    known_metrics = ", ".join(metric.name for metric in metrics_of(results))
+    raise ValueError(f"metric '{name}' is not measured; the measured metrics are: {known_metrics}")
 
 
 def _grid(values: np.ndarray) -> np.ndarray:

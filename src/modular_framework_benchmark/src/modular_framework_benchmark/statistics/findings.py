@@ -84,11 +84,11 @@ def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Findin
         matched = matched.complete_units()
     outcomes = matched.outcomes(metric.better)
     means, sizes = unit_means(outcomes, _coarser_units(matched))
-    finding = replace(empty, counts=_counts(matched, outcomes, len(means)))
+    finding = replace(empty, counts=_pair_counts(matched, outcomes, len(means)))
     if not len(matched):
         return finding
     finding = replace(
-        _tested(finding, means, sizes, settings),
+        _with_test(finding, means, sizes, settings),
         first_estimate=_point_estimate(matched.first.scores, metric),
         second_estimate=_point_estimate(matched.second.scores, metric),
         mean_difference=_mean_difference(matched, metric, settings),
@@ -97,7 +97,7 @@ def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Findin
     )
     if not matched.broken.any():
         return finding
-    return replace(finding, without_broken=_compare_pairs(empty, matched.selected(~matched.broken), settings))
+    return replace(finding, without_broken=_compare_pairs(empty, matched.select(~matched.broken), settings))
 
 
 def _coarser_units(matched: Pairs) -> Integers:
@@ -105,7 +105,7 @@ def _coarser_units(matched: Pairs) -> Integers:
     return min(matched.first.units, matched.second.units, key=lambda partition: len(np.unique(partition)))
 
 
-def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
+def _pair_counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
     sides = (matched.first, matched.second)
     return PairCounts(
         pairs=len(matched),
@@ -121,7 +121,7 @@ def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
     )
 
 
-def _tested(finding: Finding, means: Floats, sizes: Integers, settings: Settings) -> Finding:
+def _with_test(finding: Finding, means: Floats, sizes: Integers, settings: Settings) -> Finding:
     """Returns the finding with the mean win difference over the units and its test."""
     p_value: float | None = None
     interval: Interval | None = None
@@ -148,13 +148,13 @@ def _point_estimate(scores: Floats, metric: Metric) -> float:
 def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Estimate | None:
     """Returns the mean difference over the pairs with two known values; descriptive only."""
     differences = matched.first.values - matched.second.values
-    known = ~np.isnan(differences)
-    if metric.kind is MetricKind.RATE or not known.any():
+    is_known = ~np.isnan(differences)
+    if metric.kind is MetricKind.RATE or not is_known.any():
         return None
-    means, _ = unit_means(differences[known], _coarser_units(matched)[known])
+    means, _ = unit_means(differences[is_known], _coarser_units(matched)[is_known])
     bounds_width = metric.bounds[1] - metric.bounds[0]
     interval = None
-    wanted = settings.mean_intervals or metric.kind is MetricKind.PARTIAL_CREDIT
-    if wanted and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
+    is_wanted = settings.mean_intervals or metric.kind is MetricKind.PARTIAL_CREDIT
+    if is_wanted and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
         interval = sequential.anytime_interval(means, settings.confidence, bounds_width)
     return Estimate("mean difference", float(np.mean(means)), interval)

@@ -92,7 +92,7 @@ class Pairs:
         """Returns whether either episode of each pair is broken, shape (n,)."""
         return np.asarray(self.first.broken | self.second.broken)
 
-    def selected(self, mask: Flags) -> Pairs:
+    def select(self, mask: Flags) -> Pairs:
         """Returns the pairs that the mask selects."""
         rows = np.flatnonzero(mask)
         return dataclasses.replace(self, first=self.first.at_rows(rows), second=self.second.at_rows(rows))
@@ -102,7 +102,7 @@ class Pairs:
         if not len(self):
             return self
         _, units, sizes = np.unique(self.first.units, return_inverse=True, return_counts=True)
-        return self.selected(sizes[units] == sizes.max())
+        return self.select(sizes[units] == sizes.max())
 
     def outcomes(self, better: Direction) -> Floats:
         """Returns 1 for each pair that the first method wins, -1 if the second wins, 0 for a tie or two failures."""
@@ -138,7 +138,7 @@ def other_factors(results: ExperimentResults) -> tuple[Factor, ...]:
     return tuple(factor for factor in results.description.factors if factor.name != results.description.compared)
 
 
-def restricted(results: ExperimentResults, factor: str, *levels: str) -> ExperimentResults:
+def restrict_results(results: ExperimentResults, factor: str, *levels: str) -> ExperimentResults:
     """Returns the results of the episodes at some levels of a factor.
 
     Args:
@@ -194,8 +194,8 @@ class EpisodeTable:
     def counts(self, metric: Metric, method: str) -> EpisodeCounts:
         """Returns the numbers of a method's episodes by outcome and by their part in a metric's figures."""
         statuses = self._statuses[self._rows[method]]
-        seen = self.observations(metric, method)
-        present = ~np.isnan(seen.scores)
+        observed = self.observations(metric, method)
+        present = ~np.isnan(observed.scores)
 
         def count_status(status: EpisodeStatus) -> int:
             return int(np.sum(statuses == status.value))
@@ -207,9 +207,9 @@ class EpisodeTable:
             timed_out=count_status(EpisodeStatus.TIMED_OUT),
             broken=count_status(EpisodeStatus.BROKEN),
             counted=int(present.sum()),
-            censored=int(seen.censored.sum()),
+            censored=int(observed.censored.sum()),
             missing=int((~present).sum()),
-            units=len(np.unique(seen.units[present])),
+            units=len(np.unique(observed.units[present])),
         )
 
     def pairs(self, metric: Metric, first: str, second: str) -> Pairs:
@@ -238,8 +238,8 @@ class EpisodeTable:
             alike = self._first_of_stack[paired[0]] == self._first_of_stack[paired[1]]
         present = ~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores)
         missing, unlike = int(np.sum(~present)), int(np.sum(present & ~alike))
-        found = Pairs(sides[0], sides[1], missing, unlike, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
-        return found.selected(present & alike)
+        pairs = Pairs(sides[0], sides[1], missing, unlike, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
+        return pairs.select(present & alike)
 
     def _column(self, metric: Metric) -> Observations:
         """Returns the observations of a metric in every episode."""
@@ -258,7 +258,7 @@ class EpisodeTable:
         values[~np.isfinite(values) | self._broken] = np.nan
         if metric.kind is MetricKind.PARTIAL_CREDIT and not np.isnan(values).all():
             values = np.clip(np.nan_to_num(values, nan=0.0), 0.0, 1.0)
-        scores, failed = values.copy(), self._failed(values, metric)
+        scores, failed = values.copy(), self._failure_flags(values, metric)
         scores[failed] = -np.inf if metric.better is Direction.HIGHER else np.inf
         censored = np.zeros(count, dtype=bool)
         if metric.limit is not None:
@@ -266,7 +266,7 @@ class EpisodeTable:
             values[censored] = metric.limit
         return Observations(values, scores, censored, self._broken, self._units)
 
-    def _failed(self, values: Floats, metric: Metric) -> Flags:
+    def _failure_flags(self, values: Floats, metric: Metric) -> Flags:
         """Returns whether each episode ranks worse than any value."""
         if metric.is_fraction or np.isnan(values).all():  # never reported, such as the hold time
             return np.zeros(len(values), dtype=bool)
@@ -279,9 +279,9 @@ class EpisodeTable:
             return
         row = self.results.episodes.iloc[np.setdiff1d(rows, rows[places])[0]]
         names = [factor.name for factor in other_factors(self.results)] + ["trial"]
-        found = ", ".join(f"{name}={row[name]}" for name in names)
+        first_levels = ", ".join(f"{name}={row[name]}" for name in names)
         raise ValueError(
-            f"two episodes of method {method} have {found}; each combination of levels and trial must occur once"
+            f"two episodes of method {method} have {first_levels}; each combination of levels and trial must occur once"
         )
 
 
@@ -309,8 +309,10 @@ def _factor(results: ExperimentResults, name: str) -> Factor:
     for factor in results.description.factors:
         if factor.name == name:
             return factor
-    known = ", ".join(factor.name for factor in results.description.factors) or "none"
-    raise ValueError(f"experiment '{results.description.name}' has no factor '{name}'; its factors are: {known}")
+    known_factors = ", ".join(factor.name for factor in results.description.factors) or "none"
+    raise ValueError(
+        f"experiment '{results.description.name}' has no factor '{name}'; its factors are: {known_factors}"
+    )
 
 
 def _strata(results: ExperimentResults) -> NDArray[np.int64]:

@@ -27,13 +27,14 @@ def power_text(description: ExperimentDescription, episodes: Sequence[EpisodeSpe
         description: Description of the experiment.
         episodes: Planned episodes.
     """
-    results = ExperimentResults(description, _planned(description, episodes), pd.DataFrame(), len(episodes))
+    results = ExperimentResults(description, _planned_table(description, episodes), pd.DataFrame(), len(episodes))
     table, pairs, others = EpisodeTable(results), len(pairs_of_methods(results)), len(metrics_of(results)) - 1
     error_rate = (1.0 - description.confidence) * (0.5 if others else 1.0)
     nouns = f"{table.unit_noun}s"
     lines = [
         f"  what can be shown with {table.unit_count} {nouns} for each method, in 80 % of experiments "
-        f"({sentences.count(pairs, 'comparison')} of success, {pairs * others} of other metrics; Holm's correction):"
+        f"({sentences.quantity_text(pairs, 'comparison')} of success, {pairs * others} of other metrics; "
+        "Holm's correction):"
     ]
     if description.sequential:
         minimum = min_units(error_rate / max(pairs, 1), at_any_time=True)
@@ -43,8 +44,10 @@ def power_text(description: ExperimentDescription, episodes: Sequence[EpisodeSpe
         ("other metrics", pairs * others, 1.0),
     ):
         if comparisons:
-            found = _line(table.unit_count, nouns, error_rate / comparisons, discordance, description.sequential)
-            lines.append(f"    {name}: {found}")
+            detectable_text = _line(
+                table.unit_count, nouns, error_rate / comparisons, discordance, description.sequential
+            )
+            lines.append(f"    {name}: {detectable_text}")
     return "\n".join(lines)
 
 
@@ -73,7 +76,7 @@ def _difference_text(differences: Sequence[float], of_success: bool) -> str:
     return f"{numbers} points" if of_success else f"{numbers} % of the pairs won"
 
 
-def _planned(description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> pd.DataFrame:
+def _planned_table(description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> pd.DataFrame:
     """Returns the planned episodes in the form of a table of results."""
     names = [factor.name for factor in description.factors]
     rows = [

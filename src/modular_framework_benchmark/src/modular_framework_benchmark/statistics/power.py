@@ -14,7 +14,7 @@ from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_in
 from modular_framework_benchmark.statistics.sequential import anytime_p_value, log_capital
 from modular_framework_benchmark.statistics.values import MIN_UNITS
 
-POWER = 0.8
+TARGET_POWER = 0.8
 """Conventional power: the probability that an experiment shows the difference."""
 MAX_PAIRS = 1_000_000
 
@@ -64,7 +64,11 @@ def _sequential_wins(discordant: NDArray[np.int64], error_rate: float) -> NDArra
 
 @lru_cache(maxsize=1024)
 def pairs_for_rate(
-    difference: float, discordance: float, error_rate: float = 0.05, power: float = POWER, at_any_time: bool = False
+    difference: float,
+    discordance: float,
+    error_rate: float = 0.05,
+    power: float = TARGET_POWER,
+    at_any_time: bool = False,
 ) -> int | None:
     """Returns the number of paired episodes that shows a difference of rates, or None above a million.
 
@@ -110,7 +114,7 @@ def detectable_difference(
     if units < min_units(error_rate, at_any_time):
         return None
     for points in range(1, 101):
-        if rate_power(units, points / 100, discordance, error_rate, at_any_time) >= POWER:
+        if rate_power(units, points / 100, discordance, error_rate, at_any_time) >= TARGET_POWER:
             return points / 100
     return None
 

@@ -14,7 +14,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from modular_framework_benchmark.statistics.comparison import Interval
 
-MAX_OUTSIDE = 3
+MAX_UNITS_OUTSIDE_MODE = 3
 """Number of units outside the most frequent outcome up to which Tango's interval covers too little (down to 83 %)."""
 
 CORRECTION = 0.5
@@ -66,10 +66,10 @@ def paired_p_value(outcomes: PairOutcomes) -> float:
 def paired_interval(outcomes: PairOutcomes, confidence: float = 0.95) -> Interval:
     """Returns the confidence interval of a win difference, which for a rate is the paired difference of two rates.
 
-    It is Tango's score interval. If at most `MAX_OUTSIDE` pairs lie outside the larger of won and lost, the interval is
-    the difference of two Clopper-Pearson intervals with half of the error each.
+    It is Tango's score interval. If at most `MAX_UNITS_OUTSIDE_MODE` pairs lie outside the larger of won and lost, the
+    interval is the difference of two Clopper-Pearson intervals with half of the error each.
     """
-    if outcomes.pairs - max(outcomes.won, outcomes.lost) <= MAX_OUTSIDE:
+    if outcomes.pairs - max(outcomes.won, outcomes.lost) <= MAX_UNITS_OUTSIDE_MODE:
         won, lost = (
             rate_interval(count, outcomes.pairs, (1 + confidence) / 2) for count in (outcomes.won, outcomes.lost)
         )

@@ -32,7 +32,7 @@ from modular_framework_benchmark.statistics.observations import (
     methods_of,
     metrics_of,
     other_factors,
-    restricted,
+    restrict_results,
 )
 from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval
 from modular_framework_benchmark.statistics.summaries import summarise_method
@@ -40,7 +40,7 @@ from modular_framework_benchmark.statistics.values import MIN_UNITS
 
 MAX_GROUPS = 5
 """Number of groups into which the points of a space-filling design are divided along an axis."""
-FIT = "isotonic regression on each side of the nominal value"
+FIT_METHOD = "isotonic regression on each side of the nominal value"
 
 
 class CrossingKind(Enum):
@@ -150,7 +150,7 @@ class Robustness:
     def fit(self) -> str:
         """Returns the name of the fit."""
         averaged = "" if self.perturbations.one_at_a_time else ", averaged over the other axes"
-        return f"{FIT}{averaged}"
+        return f"{FIT_METHOD}{averaged}"
 
     def of_axis(self, name: str) -> tuple[RobustnessCurve, ...]:
         """Returns the curves along an axis."""
@@ -187,13 +187,13 @@ class _Analysis:
 
     def curves(self, axis: PerturbedAxis) -> list[RobustnessCurve]:
         """Returns the curve of each method along an axis."""
-        groups, wanted = _groups(axis, self._perturbations), self._perturbations.wanted_success
-        tables = [EpisodeTable(restricted(self._results, PERTURBATION, *group.labels)) for group in groups]
+        groups, wanted_success = _groups(axis, self._perturbations), self._perturbations.wanted_success
+        tables = [EpisodeTable(restrict_results(self._results, PERTURBATION, *group.labels)) for group in groups]
         curves = []
         for method in methods_of(self._results):
             points = tuple(self._point(*each, method) for each in zip(groups, tables, strict=True))
             fall = self._fall(axis, method, points, groups)
-            sides = _sides(axis, points, wanted)
+            sides = _sides(axis, points, wanted_success)
             curves.append(RobustnessCurve(axis=axis, method=method, points=points, sides=sides, fall=fall))
         return curves
 
@@ -220,7 +220,7 @@ class _Analysis:
         if not self._perturbations.one_at_a_time:
             highest = max(rate for rate, _, _ in known)
             return Fall(value=value, points=Estimate("difference of groups", highest - lowest, None), pairs=0)
-        outcomes = self._paired(method, group.labels[0])
+        outcomes = self._paired_outcomes(method, group.labels[0])
         if outcomes is None:
             return None
         description = self._results.description
@@ -230,7 +230,7 @@ class _Analysis:
         estimate = Estimate("paired difference", outcomes.difference, interval)
         return Fall(value=value, points=estimate, pairs=outcomes.pairs)
 
-    def _paired(self, method: str, label: str) -> PairOutcomes | None:
+    def _paired_outcomes(self, method: str, label: str) -> PairOutcomes | None:
         """Returns the scenes that succeed only at the nominal level (won) or only at another level (lost)."""
         results = self._results
         episodes = results.episodes[results.episodes[results.description.compared] == method]
@@ -247,15 +247,15 @@ def _groups(axis: PerturbedAxis, perturbations: Perturbations) -> list[_Group]:
     """Returns the levels of an axis in ascending order; those of a space-filling design in groups of equal size."""
     if perturbations.one_at_a_time:
         of_axis = [level for level in perturbations.levels if _perturbs_only(level, axis, perturbations)]
-        return [_Group((level.values[axis.name],), (level.label,)) for level in _ordered(of_axis, axis)]
-    points = _ordered([level for level in perturbations.levels if level.label != NOMINAL], axis)
+        return [_Group((level.values[axis.name],), (level.label,)) for level in _sorted_levels(of_axis, axis)]
+    points = _sorted_levels([level for level in perturbations.levels if level.label != NOMINAL], axis)
     parts = np.array_split(np.arange(len(points)), min(MAX_GROUPS, len(points)))
     return [
         _Group(tuple(points[i].values[axis.name] for i in part), tuple(points[i].label for i in part)) for part in parts
     ]
 
 
-def _ordered(levels: Sequence[PerturbedLevel], axis: PerturbedAxis) -> list[PerturbedLevel]:
+def _sorted_levels(levels: Sequence[PerturbedLevel], axis: PerturbedAxis) -> list[PerturbedLevel]:
     return sorted(levels, key=lambda level: level.values[axis.name])
 
 
@@ -264,31 +264,35 @@ def _perturbs_only(level: PerturbedLevel, axis: PerturbedAxis, perturbations: Pe
     return all(level.values[other.name] == other.nominal for other in others)
 
 
-def _sides(axis: PerturbedAxis, points: Sequence[CurvePoint], wanted: float) -> tuple[FittedSide, ...]:
-    known = [point for point in points if point.success.estimate is not None]
-    above = [point for point in known if point.value >= axis.nominal]
-    below = [point for point in reversed(known) if point.value <= axis.nominal]
-    return tuple(_side(side, wanted) for side in (below, above) if any(point.value != axis.nominal for point in side))
+def _sides(axis: PerturbedAxis, points: Sequence[CurvePoint], wanted_success: float) -> tuple[FittedSide, ...]:
+    known_points = [point for point in points if point.success.estimate is not None]
+    above = [point for point in known_points if point.value >= axis.nominal]
+    below = [point for point in reversed(known_points) if point.value <= axis.nominal]
+    return tuple(
+        _side(side, wanted_success) for side in (below, above) if any(point.value != axis.nominal for point in side)
+    )
 
 
-def _side(points: Sequence[CurvePoint], wanted: float) -> FittedSide:
+def _side(points: Sequence[CurvePoint], wanted_success: float) -> FittedSide:
     """Returns the fit of points in the order of their distance from the nominal value."""
     estimates = [point.success.estimate for point in points if point.success.estimate is not None]
-    rates = fitted_rates([found.value for found in estimates], [point.success.counts.counted for point in points])
+    rates = fitted_rates([estimate.value for estimate in estimates], [point.success.counts.counted for point in points])
     values = [point.value for point in points]
-    below = [index for index, rate in enumerate(rates) if rate < wanted]
+    below = [index for index, rate in enumerate(rates) if rate < wanted_success]
     first = below[0] if below else None
     kind, crossing = CrossingKind.NOT_REACHED, None
     if first == 0:
         kind = CrossingKind.AT_NOMINAL
     elif first is not None:
         kind = CrossingKind.WITHIN
-        fraction = (rates[first - 1] - wanted) / (rates[first - 1] - rates[first])
+        fraction = (rates[first - 1] - wanted_success) / (rates[first - 1] - rates[first])
         crossing = values[first - 1] + fraction * (values[first] - values[first - 1])
-    intervals = [found.interval for found in estimates]
+    intervals = [estimate.interval for estimate in estimates]
     # Both claims go through the levels in order, and need no correction for their number: each level is a condition.
-    reached_count = sum(1 for _ in takewhile(lambda found: found and found.low >= wanted, intervals))
-    below_count = sum(1 for _ in takewhile(lambda found: found and found.high < wanted, reversed(intervals)))
+    reached_count = sum(1 for _ in takewhile(lambda estimate: estimate and estimate.low >= wanted_success, intervals))
+    below_count = sum(
+        1 for _ in takewhile(lambda estimate: estimate and estimate.high < wanted_success, reversed(intervals))
+    )
     return FittedSide(
         values=tuple(values),
         rates=rates,

@@ -10,26 +10,26 @@ from modular_framework_benchmark.records.experiment import Direction, Metric, Me
 from modular_framework_benchmark.statistics.comparison import EpisodeCounts, Estimate, Interval, PairCounts, PairFigures
 
 
-def claim(metric: Metric, better: str, worse: str, figures_text: str) -> str:
+def claim_sentence(metric: Metric, better: str, worse: str, figures_text: str) -> str:
     """Returns the sentence for a difference that is shown.
 
     Args:
         metric: Compared metric.
         better: Better method.
         worse: Other method.
-        figures_text: Text of the figures, from `figures`.
+        figures_text: Text of the figures, from `comparison_figures_text`.
     """
     return f"{better} {_comparative(metric)} {worse} ({figures_text})"
 
 
-def no_claim(metric: Metric, first: str, second: str, figures_text: str) -> str:
+def no_claim_sentence(metric: Metric, first: str, second: str, figures_text: str) -> str:
     """Returns the sentence for a comparison without a shown difference.
 
     Args:
         metric: Compared metric.
         first: First method.
         second: Second method.
-        figures_text: Text of the figures, from `figures`.
+        figures_text: Text of the figures, from `comparison_figures_text`.
     """
     return f"no difference in {spaced_name(metric)} shown between {first} and {second} ({figures_text})"
 
@@ -44,7 +44,7 @@ def not_showable(metric: Metric, first: str, second: str, counts: PairCounts, no
         counts: Pairs of the comparison.
         noun: Name of a unit.
     """
-    units = count(counts.units, "pair" if counts.units == counts.pairs else noun)
+    units = quantity_text(counts.units, "pair" if counts.units == counts.pairs else noun)
     return (
         f"a difference in {spaced_name(metric)} between {first} and {second} could not have been shown with {units} "
         f"({counts.won} won, {counts.lost} lost)"
@@ -63,12 +63,12 @@ def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> 
     return f"nothing to compare between {first} and {second} in {spaced_name(metric)}: {reason}"
 
 
-def planned(pairs: int, difference: float) -> str:
+def planned_pairs_text(pairs: int, difference: float) -> str:
     """Returns the end of a sentence that gives the number of pairs needed for a win difference."""
     return f"; {pairs} paired episodes would show {100 * difference:g} points"
 
 
-def figures(metric: Metric, comparison: PairFigures, swapped: bool = False) -> str:
+def comparison_figures_text(metric: Metric, comparison: PairFigures, swapped: bool = False) -> str:
     """Returns the win difference, its interval and the number of pairs, as text for parentheses.
 
     Args:
@@ -87,7 +87,7 @@ def figures(metric: Metric, comparison: PairFigures, swapped: bool = False) -> s
         won, lost = (counts.lost, counts.won) if swapped else (counts.won, counts.lost)
         parts = [f"{won} pairs won, {lost} lost"]
     digits = 0 if interval is None else max(_digits(100 * interval.low, 100 * interval.high) - 1, 0)
-    parts.append(_points(100 * sign * comparison.difference.value, digits))
+    parts.append(_points_text(100 * sign * comparison.difference.value, digits))
     if interval is not None:
         ends = sorted(100 * sign * end for end in (interval.low, interval.high))
         low, high = (_number(end, digits) for end in ends)
@@ -99,7 +99,7 @@ def figures(metric: Metric, comparison: PairFigures, swapped: bool = False) -> s
     return ", ".join(parts)
 
 
-def summary(metric: Metric, method: str, estimate: Estimate | None, counts: EpisodeCounts) -> str:
+def summary_sentence(metric: Metric, method: str, estimate: Estimate | None, counts: EpisodeCounts) -> str:
     """Returns the sentence that summarises a metric of a method.
 
     Args:
@@ -109,7 +109,9 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
         counts: Counts of the method's episodes.
     """
     if estimate is None:
-        reason = f"none of {count(counts.episodes, 'episode')} has a value" if counts.episodes else "no episodes"
+        reason = (
+            f"none of {quantity_text(counts.episodes, 'episode')} has a value" if counts.episodes else "no episodes"
+        )
         return f"{method}: no {spaced_name(metric)} ({reason})"
     scale = 100.0 if metric.is_fraction else 1.0
     unit = " %" if metric.is_fraction else f" {metric.unit}".rstrip()
@@ -122,7 +124,7 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     prefix = "" if metric.kind is MetricKind.RATE else f" {estimate.name} of"
     return (
         f"{method}:{prefix} {spaced_name(metric)} {_number(scale * estimate.value, digits)}{unit} ({interval_text}, "
-        f"{count(counts.counted, 'episode')}{_remarks(counts)})"
+        f"{quantity_text(counts.counted, 'episode')}{_remarks(counts)})"
     )
 
 
@@ -134,7 +136,7 @@ def needed_episodes(metric: Metric, mean: str, episodes: Mapping[str, int]) -> s
         mean: Name of the mean.
         episodes: Number of episodes by method.
     """
-    needed = enumeration([f"{count(number, 'episode')} of {method}" for method, number in episodes.items()])
+    needed = enumeration([f"{quantity_text(number, 'episode')} of {method}" for method, number in episodes.items()])
     return f"For an interval, the {mean} of the {spaced_name(metric)} needs about {needed}."
 
 
@@ -146,13 +148,13 @@ def spaced_name(metric: Metric) -> str:
 def signed_amount(metric: Metric, value: float) -> str:
     """Returns a signed difference with its unit: `-0.31 s`, `+12 points`."""
     if metric.is_fraction:
-        return _points(100.0 * value, max(_digits(0.0, 100.0 * value) - 1, 0))
+        return _points_text(100.0 * value, max(_digits(0.0, 100.0 * value) - 1, 0))
     text = _number(value, _digits(0.0, value))
     sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
     return f"{sign}{text} {metric.unit}".rstrip()
 
 
-def _points(value: float, digits: int) -> str:
+def _points_text(value: float, digits: int) -> str:
     text = _number(value, digits)
     sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
     return f"{sign}{text} {'point' if text in ('1', '-1') else 'points'}"
@@ -186,8 +188,8 @@ def _comparative(metric: Metric) -> str:
 
 
 def _episodes(counts: PairCounts, noun: str) -> str:
-    pairs = count(counts.pairs, "pair of any two episodes" if counts.at_random else "paired episode")
-    return f"{pairs} of {count(counts.units, noun)}" if counts.units < counts.pairs else pairs
+    pairs = quantity_text(counts.pairs, "pair of any two episodes" if counts.at_random else "paired episode")
+    return f"{pairs} of {quantity_text(counts.units, noun)}" if counts.units < counts.pairs else pairs
 
 
 def _remarks(counts: EpisodeCounts) -> str:
@@ -198,7 +200,7 @@ def _remarks(counts: EpisodeCounts) -> str:
     return "".join(f", {part}" for part in parts if part)
 
 
-def count(number: int, noun: str) -> str:
+def quantity_text(number: int, noun: str) -> str:
     """Returns a number with its noun; the plural applies to the first word of `noun`."""
     first, space, rest = noun.partition(" of ")
     return f"{number} {first}{'' if number == 1 else 's'}{space}{rest}"

@@ -79,7 +79,7 @@ class AnytimeValid:
             return StoppingDecision(False, "the experiment has a single method: nothing to compare")
         if len(results.episodes) >= results.planned:
             return StoppingDecision(True, f"all {results.planned} planned episodes are finished")
-        undecided = [comparison for comparison in comparisons if not self._decided(comparison)]
+        undecided = [comparison for comparison in comparisons if not self._is_decided(comparison)]
         if not undecided:
             return StoppingDecision(True, self._outcome(metric, comparisons))
         min_pairs = min(comparison.counts.pairs for comparison in comparisons)
@@ -93,10 +93,10 @@ class AnytimeValid:
         measured = ", ".join(metric.name for metric in metrics_of(results))
         raise ValueError(f"the stopping rule uses '{self.metric}', which is not measured; measured are: {measured}")
 
-    def _decided(self, comparison: Comparison) -> bool:
-        return comparison.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER) or self._equivalent(comparison)
+    def _is_decided(self, comparison: Comparison) -> bool:
+        return comparison.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER) or self._is_equivalent(comparison)
 
-    def _equivalent(self, comparison: Comparison) -> bool:
+    def _is_equivalent(self, comparison: Comparison) -> bool:
         if self.smallest_difference is None or comparison.difference is None or comparison.difference.interval is None:
             return False
         interval = comparison.difference.interval
@@ -107,7 +107,7 @@ class AnytimeValid:
         noun = "" if metric.kind is MetricKind.RATE else " of pairs won"
         parts = [
             f"{found.first} and {found.second} differ by less than {points}{noun}"
-            if self._equivalent(found)
+            if self._is_equivalent(found)
             else found.sentence
             for found in comparisons
         ]

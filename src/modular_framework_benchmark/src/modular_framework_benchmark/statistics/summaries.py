@@ -43,7 +43,7 @@ def summarise_method(table: EpisodeTable, metric: Metric, method: str) -> Method
         quartiles = float(first), float(third)
     return MethodSummary(
         method=method, metric=metric.name, unit=metric.unit, levels="", counts=counts, estimate=estimate, mean=mean,
-        quartiles=quartiles, sentence=sentences.summary(metric, method, estimate, counts),
+        quartiles=quartiles, sentence=sentences.summary_sentence(metric, method, estimate, counts),
     )  # fmt: skip
 
 

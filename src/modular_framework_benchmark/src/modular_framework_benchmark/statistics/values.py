@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from modular_framework_benchmark.statistics.comparison import Interval
-from modular_framework_benchmark.statistics.rates import MAX_OUTSIDE, rate_interval
+from modular_framework_benchmark.statistics.rates import MAX_UNITS_OUTSIDE_MODE, rate_interval
 from modular_framework_benchmark.statistics.sequential import anytime_interval
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,7 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
         low, high = (lowest, highest - end) if means[0] == lowest else (lowest + end, highest)
         return Interval(low, high, confidence, "exact, all values at the bound")
     mode_count = np.unique(means, return_counts=True)[1].max()
-    if 2 * mode_count > count or count - mode_count <= MAX_OUTSIDE:
+    if 2 * mode_count > count or count - mode_count <= MAX_UNITS_OUTSIDE_MODE:
         middle = (highest + lowest) / 2
         shifted = anytime_interval(means - middle, confidence, (highest - lowest) / 2)
         return Interval(shifted.low + middle, shifted.high + middle, confidence, "betting")

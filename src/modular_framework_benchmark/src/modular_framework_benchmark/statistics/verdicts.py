@@ -38,7 +38,7 @@ class Correction:
     strictest_level: float
 
 
-def conclude(results: ExperimentResults, finding: Finding, correction: Correction) -> Comparison:
+def conclude_comparison(results: ExperimentResults, finding: Finding, correction: Correction) -> Comparison:
     """Returns the comparison with its verdict.
 
     Args:
@@ -66,7 +66,7 @@ def conclude(results: ExperimentResults, finding: Finding, correction: Correctio
     )
 
 
-def unfinished(results: ExperimentResults) -> bool:
+def is_unfinished(results: ExperimentResults) -> bool:
     """Returns whether a fixed experiment has remaining episodes, so that a conclusion would be an interim analysis."""
     return len(results.episodes) < results.planned and not results.description.sequential
 
@@ -80,7 +80,7 @@ def _verdict(
     if finding.counts.units < min_units(correction.strictest_level, at_any_time):
         return Verdict.NOT_SHOWABLE
     interval = finding.difference.interval
-    if unfinished(results) or p_corrected is None or p_corrected > correction.error_rate or interval is None:
+    if is_unfinished(results) or p_corrected is None or p_corrected > correction.error_rate or interval is None:
         return Verdict.NOT_SHOWN
     if not sentences.ends_outside_zero(interval):
         return Verdict.NOT_SHOWN
@@ -89,16 +89,21 @@ def _verdict(
 
 def _sentence(finding: Finding, verdict: Verdict, needed: int | None, planned: float | None) -> str:
     metric, first, second, counts = finding.metric, finding.first, finding.second, finding.counts
-    ending = "" if needed is None or planned is None else sentences.planned(needed, planned)
+    ending = "" if needed is None or planned is None else sentences.planned_pairs_text(needed, planned)
     match verdict:
         case Verdict.NO_DATA:
             return sentences.nothing_to_compare(metric, first, second, _reason(finding))
         case Verdict.FIRST_BETTER:
-            return sentences.claim(metric, first, second, sentences.figures(metric, finding))
+            return sentences.claim_sentence(metric, first, second, sentences.comparison_figures_text(metric, finding))
         case Verdict.SECOND_BETTER:
-            return sentences.claim(metric, second, first, sentences.figures(metric, finding, swapped=True))
+            return sentences.claim_sentence(
+                metric, second, first, sentences.comparison_figures_text(metric, finding, swapped=True)
+            )
         case Verdict.NOT_SHOWN:
-            return sentences.no_claim(metric, first, second, sentences.figures(metric, finding)) + ending
+            return (
+                sentences.no_claim_sentence(metric, first, second, sentences.comparison_figures_text(metric, finding))
+                + ending
+            )
         case Verdict.NOT_SHOWABLE:
             return sentences.not_showable(metric, first, second, counts, finding.unit_noun) + ending
 
@@ -145,7 +150,7 @@ def _notes(
     remaining = (
         f"unfinished: {len(results.episodes)} of {results.planned} episodes; nothing is claimed before the last episode"
     )
-    return (*(note for note in notes if note), *((remaining,) if unfinished(results) else ()))
+    return (*(note for note in notes if note), *((remaining,) if is_unfinished(results) else ()))
 
 
 def _disagreement(finding: Finding, verdict: Verdict, correction: Correction) -> str:
@@ -166,12 +171,15 @@ def _exclusions(finding: Finding) -> tuple[str, ...]:
         f"{counts.failed} of {2 * counts.pairs} episodes failed and count as worse than any value"
         if counts.failed
         else "",
-        f"{sentences.count(counts.missing, 'pair')} left out because an episode has no value" if counts.missing else "",
-        f"{sentences.count(counts.unlike, 'pair')} left out because only one episode is the first of its stack"
+        f"{sentences.quantity_text(counts.missing, 'pair')} left out because an episode has no value"
+        if counts.missing
+        else "",
+        f"{sentences.quantity_text(counts.unlike, 'pair')} left out because only one episode is the first of its stack"
         if counts.unlike
         else "",
-        f"{sentences.count(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
-        f"{counts.pairs} pairs of {sentences.count(counts.units, finding.unit_noun)}; all pairs of a unit count as one"
+        f"{sentences.quantity_text(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
+        f"{counts.pairs} pairs of {sentences.quantity_text(counts.units, finding.unit_noun)}; "
+        "all pairs of a unit count as one"
         if counts.pairs_per_unit > 1.0
         else "",
     )
@@ -182,5 +190,5 @@ def _broken_note(finding: Finding, verdicts: tuple[Verdict, Verdict | None]) -> 
     if not count or without is None:
         return ""
     effect = "the verdict is the same" if verdicts[0] is verdicts[1] else "the verdict changes"
-    text = f" ({sentences.figures(without.metric, without)})" if without.difference else ""
-    return f"{sentences.count(count, 'broken episode')} counted as failures; without their pairs {effect}{text}"
+    text = f" ({sentences.comparison_figures_text(without.metric, without)})" if without.difference else ""
+    return f"{sentences.quantity_text(count, 'broken episode')} counted as failures; without their pairs {effect}{text}"
