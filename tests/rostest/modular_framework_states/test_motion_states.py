@@ -26,7 +26,7 @@ import smach
 from modular_framework_core import srv
 from modular_framework_core.msg import GraspAction, GraspResult
 from modular_framework_ros.action_client import SteadyActionClient
-from modular_framework_states.states.cartesian_move import CartesianMove, moved
+from modular_framework_states.states.cartesian_move import CartesianMove, translate_pose
 from modular_framework_states.states.execute_trajectory import ExecuteTrajectory
 from modular_framework_states.states.gripper import Gripper
 
@@ -172,7 +172,7 @@ def test_a_straight_line_is_moved_completely_or_not_at_all(arm: Arm) -> None:
 def test_an_offset_may_be_given_in_the_frame_of_the_tip() -> None:
     pose = PoseStamped()
     pose.pose.orientation.z = pose.pose.orientation.w = math.sqrt(0.5)  # turned by a right angle about z
-    result = moved(pose, (1.0, 0.0, 0.5), True).pose.position
+    result = translate_pose(pose, (1.0, 0.0, 0.5), True).pose.position
     assert (result.x, result.y, result.z) == pytest.approx((0.0, 1.0, 0.5))
 
 

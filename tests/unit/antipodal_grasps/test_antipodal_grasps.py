@@ -39,7 +39,7 @@ def placed(name: str, surface: Any, solids: list[TriangleMesh], yaw: float = 0.4
     turn = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
     place = np.array([*PLACE, TABLE_M - surface.points[:, 2].min()])
     return SceneObject(
-        name, surface.moved(turn, place), tuple(solid_meshes.moved(solid, turn, place) for solid in solids)
+        name, surface.transformed(turn, place), tuple(solid_meshes.move_mesh(solid, turn, place) for solid in solids)
     )
 
 
@@ -47,8 +47,8 @@ def box(name: str, size: tuple[float, float, float], centre: tuple[float, float,
     place = np.array(centre)
     return SceneObject(
         name,
-        surface_points.box(size).moved(np.eye(3), place),
-        (solid_meshes.moved(solid_meshes.box(size), np.eye(3), place),),
+        surface_points.box(size).transformed(np.eye(3), place),
+        (solid_meshes.move_mesh(solid_meshes.box(size), np.eye(3), place),),
     )
 
 
@@ -80,7 +80,7 @@ def query(target: SceneObject, gripper: GripperGeometry, *obstacles: SceneObject
 
 
 def tree(scene_object: SceneObject) -> fcl.CollisionObject:
-    whole = solid_meshes.joined(scene_object.solids)
+    whole = solid_meshes.join_meshes(scene_object.solids)
     model = fcl.BVHModel()
     model.beginModel(len(whole.vertices), len(whole.triangles))
     model.addSubModel(whole.vertices, whole.triangles)
@@ -142,7 +142,7 @@ def test_the_hand_advances_and_closes_without_touching_anything_but_with_its_pad
 @pytest.mark.parametrize("name", OBJECTS)
 def test_the_pads_close_on_both_contacts_within_the_friction_cone(name: str) -> None:
     gripper, target = geometry(*GRIPPERS[0]), OBJECTS[name]
-    mesh = solid_meshes.joined(target.solids)
+    mesh = solid_meshes.join_meshes(target.solids)
     triangles = mesh.vertices[mesh.triangles]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

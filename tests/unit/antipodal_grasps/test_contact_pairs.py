@@ -28,7 +28,7 @@ def drawn(mesh: trimesh.Trimesh) -> TriangleMesh:
 
 
 def shifted(mesh: TriangleMesh, *translation: float) -> TriangleMesh:
-    return solid_meshes.moved(mesh, np.eye(3), np.array(translation))
+    return solid_meshes.move_mesh(mesh, np.eye(3), np.array(translation))
 
 
 def angles(pair: ContactPair, first_normal: np.ndarray, second_normal: np.ndarray) -> tuple[float, float]:

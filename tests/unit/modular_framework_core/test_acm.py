@@ -47,8 +47,8 @@ def test_allowing_objects_when_there_are_none_changes_nothing_and_says_so() -> N
 def test_self_collision_before_any_update_allows_exactly_the_manipulator_and_restores_it() -> None:
     made = manager()
     allowed = made.allow_self_collision(True).matrix
-    assert allowed.allowed("finger_1", "finger_2")
-    assert not allowed.allowed("base", "palm")
+    assert allowed.is_allowed("finger_1", "finger_2")
+    assert not allowed.is_allowed("base", "palm")
     assert made.allow_self_collision(False).matrix == reference()
 
 
@@ -57,11 +57,11 @@ def test_allowing_an_object_touches_neither_the_hand_itself_nor_other_objects() 
     made.add_object("box")
     made.add_object("can")
     matrix = made.allow_object_collision(["box"], True).matrix
-    assert all(matrix.allowed(link, "box__link") for link in ("palm", "finger_1", "finger_2"))
-    assert not matrix.allowed("arm", "box__link")
-    assert not matrix.allowed("finger_1", "can__link")
-    assert not matrix.allowed("box__link", "can__link")
-    assert not matrix.allowed("finger_1", "finger_2")
+    assert all(matrix.is_allowed(link, "box__link") for link in ("palm", "finger_1", "finger_2"))
+    assert not matrix.is_allowed("arm", "box__link")
+    assert not matrix.is_allowed("finger_1", "can__link")
+    assert not matrix.is_allowed("box__link", "can__link")
+    assert not matrix.is_allowed("finger_1", "finger_2")
 
 
 def test_forbidding_an_object_keeps_the_pairs_of_the_robot_description() -> None:
@@ -79,8 +79,8 @@ def test_earlier_objects_are_not_touched_by_later_requests() -> None:
     made.allow_object_collision(["first"], False)
     made.add_object("second")
     matrix = made.allow_object_collision(["second"], True).matrix
-    assert not matrix.allowed("palm", "first__link")
-    assert matrix.allowed("palm", "second__link")
+    assert not matrix.is_allowed("palm", "first__link")
+    assert matrix.is_allowed("palm", "second__link")
 
 
 def test_links_of_any_name_belong_to_their_model() -> None:
@@ -88,8 +88,8 @@ def test_links_of_any_name_belong_to_their_model() -> None:
     made.add_object("shelf__left")
     made.add_object("shelf__right")
     matrix = made.allow_object_collision(["shelf"], True).matrix
-    assert matrix.allowed("palm", "shelf__left")
-    assert matrix.allowed("palm", "shelf__right")
+    assert matrix.is_allowed("palm", "shelf__left")
+    assert matrix.is_allowed("palm", "shelf__right")
     assert object_id("box") == "box__link"
 
 
@@ -101,7 +101,7 @@ def test_objects_may_come_before_the_reference_and_stay_after_a_new_start() -> N
     made.reinitialise()
     matrix = made.current().matrix
     assert "early__link" in matrix.names
-    assert not matrix.allowed("palm", "early__link")
+    assert not matrix.is_allowed("palm", "early__link")
 
 
 def test_a_double_object_and_an_unknown_one_are_warned_of() -> None:
@@ -120,10 +120,10 @@ def test_manipulator_links_follow_the_latest_reference() -> None:
     made.add_object("box")
     made.set_initial(reference(), [1])
     matrix = made.allow_object_collision([], True).matrix
-    assert matrix.allowed("arm", "box__link")
-    assert not matrix.allowed("palm", "box__link")
+    assert matrix.is_allowed("arm", "box__link")
+    assert not matrix.is_allowed("palm", "box__link")
     made.set_initial(reference(), [], "finger")
-    assert made.allow_object_collision([], True).matrix.allowed("finger_2", "box__link")
+    assert made.allow_object_collision([], True).matrix.is_allowed("finger_2", "box__link")
 
 
 def test_wrong_indices_and_matrices_are_refused() -> None:
@@ -167,19 +167,19 @@ def test_after_any_history_the_matrix_is_square_symmetric_and_forbidding_restore
     assert matrix.rows == tuple(zip(*matrix.rows, strict=True))
     made.allow_self_collision(False)
     restored = made.allow_object_collision([], False).matrix
-    assert [[restored.allowed(a, b) for b in NAMES] for a in NAMES] == [list(row) for row in reference().rows]
+    assert [[restored.is_allowed(a, b) for b in NAMES] for a in NAMES] == [list(row) for row in reference().rows]
 
 
 def test_any_links_may_be_chosen_instead_of_the_manipulators() -> None:
     made = manager()
     made.add_object("box")
     matrix = made.allow_object_collision(["box"], True, ["arm"]).matrix
-    assert matrix.allowed("arm", "box__link") and not matrix.allowed("palm", "box__link")
+    assert matrix.is_allowed("arm", "box__link") and not matrix.is_allowed("palm", "box__link")
     matrix = made.allow_self_collision(True, ["base", "finger_1"]).matrix
-    assert matrix.allowed("base", "finger_1") and not matrix.allowed("finger_1", "finger_2")
+    assert matrix.is_allowed("base", "finger_1") and not matrix.is_allowed("finger_1", "finger_2")
     assert made.permissions() == {frozenset(("arm", "box__link")), frozenset(("base", "finger_1"))}
     made.allow_object_collision([], False, ["arm"])
-    assert made.allow_self_collision(False, ["base", "finger_1", "arm"]).matrix.allowed("base", "arm")
+    assert made.allow_self_collision(False, ["base", "finger_1", "arm"]).matrix.is_allowed("base", "arm")
     assert made.permissions() == frozenset()
 
 
@@ -216,4 +216,4 @@ def test_an_object_that_left_the_simulation_takes_its_permissions_along() -> Non
     assert made.objects == ("outer::can__link",)
     assert made.permissions() == frozenset()
     made.add_object("box")
-    assert not made.current().matrix.allowed("palm", "box__link")
+    assert not made.current().matrix.is_allowed("palm", "box__link")

@@ -19,7 +19,7 @@ from modular_framework_core.grasping.grasp_server import (
     torque_intensities,
     torque_share,
 )
-from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidence
+from modular_framework_core.grasping.stall_evidence import CommandedMotion, StallEvidence
 
 URDF = """<robot name="r"><link name="base"/><link name="l1"/><link name="l2"/>
 <link name="palm"/><link name="f1"/><link name="f2"/>
@@ -138,8 +138,8 @@ def test_torque_intensities_are_reported_by_joint_and_none_are_none() -> None:
 STALL = Outcome({"f": 0.4}, True, "so said the controller")
 
 
-def close(begun: dict[str, float], effort: float | None = 0.5) -> Attempt:
-    return Attempt(begun, {"f": 1.94}, {} if effort is None else {"f": effort})
+def close(begun: dict[str, float], effort: float | None = 0.5) -> CommandedMotion:
+    return CommandedMotion(begun, {"f": 1.94}, {} if effort is None else {"f": effort})
 
 
 def held_at(position: float) -> StallEvidence:
@@ -183,16 +183,16 @@ def test_fingers_that_never_moved_hold_nothing(begun: dict[str, float], evidence
 @pytest.mark.parametrize(
     ("earlier", "effort", "stopped"),
     [
-        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.5, True),
-        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), None, True),
-        (Attempt({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.4, False),  # less than what moved them
-        (Attempt({"f": 0.0}, {"f": 0.4}, {}), 0.5, False),  # moved by whatever the controller gave
-        (Attempt({"f": 0.9}, {"f": 0.4}, {"f": 0.5}), 0.5, False),  # moved the other way
-        (Attempt({"f": 0.399}, {"f": 0.4}, {"f": 0.5}), 0.5, False),
+        (CommandedMotion({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.5, True),
+        (CommandedMotion({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), None, True),
+        (CommandedMotion({"f": 0.0}, {"f": 0.4}, {"f": 0.5}), 0.4, False),  # less than what moved them
+        (CommandedMotion({"f": 0.0}, {"f": 0.4}, {}), 0.5, False),  # moved by whatever the controller gave
+        (CommandedMotion({"f": 0.9}, {"f": 0.4}, {"f": 0.5}), 0.5, False),  # moved the other way
+        (CommandedMotion({"f": 0.399}, {"f": 0.4}, {"f": 0.5}), 0.5, False),
     ],
 )
 def test_fingers_that_touch_an_object_from_the_beginning_grasp_it_with_a_torque_that_moved_them(
-    earlier: Attempt, effort: float | None, stopped: bool
+    earlier: CommandedMotion, effort: float | None, stopped: bool
 ) -> None:
     evidence = StallEvidence(0.05)
     evidence.judge(Outcome({"f": 0.4}, False), earlier)
@@ -202,7 +202,7 @@ def test_fingers_that_touch_an_object_from_the_beginning_grasp_it_with_a_torque_
 def test_of_several_joints_one_that_is_short_of_its_target_must_have_moved() -> None:
     outcome, targets = Outcome({"f": 0.4, "h": 1.0}, True), {"f": 1.9, "h": 1.0}
     for begun, stopped in (({"f": 0.4, "h": 0.0}, False), ({"f": 0.1, "h": 1.0}, True)):
-        assert StallEvidence(0.05).judge(outcome, Attempt(begun, targets, {})).stalled is stopped
+        assert StallEvidence(0.05).judge(outcome, CommandedMotion(begun, targets, {})).stalled is stopped
 
 
 @pytest.mark.parametrize(

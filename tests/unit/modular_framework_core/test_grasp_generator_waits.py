@@ -131,7 +131,7 @@ def test_what_cannot_be_grasped_is_signalled_at_once(watched):
 
 
 def moved(x: float) -> list[SceneObject]:
-    return [SceneObject(box.name, box.surface.moved(np.eye(3), np.array([x, 0.0, 0.0]))) for box in BOX]
+    return [SceneObject(box.name, box.surface.transformed(np.eye(3), np.array([x, 0.0, 0.0]))) for box in BOX]
 
 
 def test_an_object_that_was_moved_gives_grasps_again_once_it_rests(watched):

@@ -15,7 +15,7 @@ import pytest
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_checks import declared_types
-from modular_framework_core.state_api.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, Plain
+from modular_framework_core.state_api.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, ScalarType
 from modular_framework_core.task_constructor.explanation import explain, option_meanings
 from modular_framework_core.task_constructor.loading import load_state_class
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
@@ -102,7 +102,7 @@ def test_every_number_says_its_limits(name: str) -> None:
         option.name
         for option in CATALOGUE.get(name).options.values()
         for part in parts(option.type)
-        if isinstance(part, Plain) and part.kind in ("float", "int") and part.limits is None
+        if isinstance(part, ScalarType) and part.kind in ("float", "int") and part.limits is None
     ]
     assert unlimited == []
 

@@ -22,8 +22,8 @@ from modular_framework_states.place_poses import (
 )
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
-TABLE = solid_meshes.moved(solid_meshes.box((1.2, 0.8, 0.03)), np.eye(3), np.array([0.0, 0.56, 0.825]))
-LEG = solid_meshes.moved(solid_meshes.box((0.05, 0.05, 0.81)), np.eye(3), np.array([0.56, 0.2, 0.405]))
+TABLE = solid_meshes.move_mesh(solid_meshes.box((1.2, 0.8, 0.03)), np.eye(3), np.array([0.0, 0.56, 0.825]))
+LEG = solid_meshes.move_mesh(solid_meshes.box((0.05, 0.05, 0.81)), np.eye(3), np.array([0.56, 0.2, 0.405]))
 CUBE = [solid_meshes.box((0.05, 0.05, 0.05))]
 GOAL = TargetRegion(name="goal", x=(0.1, 0.2), y=(0.4, 0.6))
 IDENTITY = Rotation.identity()
@@ -53,7 +53,7 @@ def test_an_object_that_was_tilted_in_the_hand_is_set_upright() -> None:
 
 def test_the_centre_of_the_box_is_in_the_region_wherever_the_origin_of_the_object_is() -> None:
     # 0.1 long, from x = 0 to 0.1 and z = 0 to 0.04 in its frame, turned by 90 degrees: it lies along y
-    block = [solid_meshes.moved(solid_meshes.box((0.1, 0.02, 0.04)), np.eye(3), np.array([0.05, 0.0, 0.02]))]
+    block = [solid_meshes.move_mesh(solid_meshes.box((0.1, 0.02, 0.04)), np.eye(3), np.array([0.05, 0.0, 0.02]))]
     best = place_poses(block, Rotation.from_euler("z", math.pi / 2), face(), GOAL)[0]
     assert np.allclose(best.position, [0.15, 0.5 - 0.05, 0.84])
 
@@ -61,7 +61,7 @@ def test_the_centre_of_the_box_is_in_the_region_wherever_the_origin_of_the_objec
 def l_shape() -> list[TriangleMesh]:
     """The shape of the model l_bracket: two boxes that touch."""
     return [
-        solid_meshes.moved(solid_meshes.box(size), np.eye(3), np.array(centre))
+        solid_meshes.move_mesh(solid_meshes.box(size), np.eye(3), np.array(centre))
         for size, centre in (((0.08, 0.03, 0.02), (0.0, 0.0, -0.03)), ((0.02, 0.03, 0.06), (-0.03, 0.0, 0.01)))
     ]
 
@@ -74,7 +74,7 @@ def pyramid() -> list[TriangleMesh]:
 
 @pytest.mark.parametrize("solids", [CUBE, l_shape(), pyramid(), [solid_meshes.cylinder(0.1, 0.02)]])
 def test_the_stable_directions_are_those_of_trimesh(solids: list[TriangleMesh]) -> None:
-    joined = solid_meshes.joined(solids)
+    joined = solid_meshes.join_meshes(solids)
     transforms, _ = trimesh.poses.compute_stable_poses(trimesh.Trimesh(joined.vertices, joined.triangles), n_samples=1)
     wanted = np.array([transform[:3, :3].T @ [0.0, 0.0, -1.0] for transform in transforms])
     found = stable_directions(solids)
@@ -103,7 +103,7 @@ def test_beside_an_edge_the_object_stays_on_the_surface() -> None:
 
 
 def test_what_does_not_fit_is_refused_with_its_size_and_the_size_of_the_surface() -> None:
-    small = [solid_meshes.moved(CUBE[0], np.eye(3), np.array([0.15, 0.5, 0.865]))]
+    small = [solid_meshes.move_mesh(CUBE[0], np.eye(3), np.array([0.15, 0.5, 0.865]))]
     top = upper_face(small, TargetRegion())
     large = [solid_meshes.box((0.1, 0.1, 0.05))]
     with pytest.raises(PlaceError) as fault:
@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_refused_with_its_size_and_the_size_of_the_surface(
 def block_below(turn_rad: float) -> list[TriangleMesh]:
     """A cube of 50 mm on the table at (0.15, 0.5), turned about the vertical."""
     rotation = Rotation.from_euler("z", turn_rad).as_matrix()
-    return [solid_meshes.moved(CUBE[0], rotation, np.array([0.15, 0.5, 0.865]))]
+    return [solid_meshes.move_mesh(CUBE[0], rotation, np.array([0.15, 0.5, 0.865]))]
 
 
 @pytest.mark.parametrize(("below", "held"), [(0.2, 0.9), (-0.7, 0.7), (0.0, math.pi / 4 - 0.01), (3.0, -3.0)])
@@ -139,7 +139,9 @@ def test_a_block_is_turned_by_the_least_angle_that_makes_its_edges_parallel_to_t
 def test_a_bar_lies_along_or_across_the_longest_edge_of_its_support() -> None:
     bar = [solid_meshes.box((0.04, 0.02, 0.02))]
     support = [
-        solid_meshes.moved(solid_meshes.box((0.1, 0.06, 0.02)), Rotation.from_euler("z", 0.5).as_matrix(), np.zeros(3))
+        solid_meshes.move_mesh(
+            solid_meshes.box((0.1, 0.06, 0.02)), Rotation.from_euler("z", 0.5).as_matrix(), np.zeros(3)
+        )
     ]
     limits = PlaceLimits(max_tilt_rad=0.1, aligned=True)
     best = place_poses(bar, Rotation.from_euler("z", 0.6), upper_face(support, TargetRegion()), TargetRegion(), limits)[
@@ -151,7 +153,7 @@ def test_a_bar_lies_along_or_across_the_longest_edge_of_its_support() -> None:
 
 def test_the_height_of_the_region_chooses_the_board_of_a_shelf() -> None:
     boards = [
-        solid_meshes.moved(solid_meshes.box((0.6, 0.3, 0.02)), np.eye(3), np.array([0, 0.5, z])) for z in (0.5, 0.9)
+        solid_meshes.move_mesh(solid_meshes.box((0.6, 0.3, 0.02)), np.eye(3), np.array([0, 0.5, z])) for z in (0.5, 0.9)
     ]
     assert upper_face(boards, TargetRegion()).height == pytest.approx(0.91)
     lower = TargetRegion(name="low", x=(-0.1, 0.1), y=(0.4, 0.6), z=(0.45, 0.7))

@@ -50,7 +50,7 @@ def rough(shape: Shape, error: tuple[float, float, float] = (0.01, -0.01, 0.0)) 
         if isinstance(shape, Box)
         else (2 * shape.radius, 2 * shape.radius, getattr(shape, "height", 2 * shape.radius))
     )
-    return SceneObject("thing", surface_points.box(size).moved(shape.axes, np.array(shape.centre) + error))
+    return SceneObject("thing", surface_points.box(size).transformed(shape.axes, np.array(shape.centre) + error))
 
 
 def query(shape: Shape, which: int = 0, seed: int = 1, obstacles: tuple[SceneObject, ...] = ()) -> GraspQuery:
@@ -181,8 +181,8 @@ def test_objects_of_the_scene_that_the_camera_does_not_see_are_avoided_too() -> 
         place = np.array([x, y, TABLE_M + size[2] / 2])
         return SceneObject(
             "wall",
-            surface_points.box(size).moved(np.eye(3), place),
-            (solid_meshes.moved(solid_meshes.box(size), np.eye(3), place),),
+            surface_points.box(size).transformed(np.eye(3), place),
+            (solid_meshes.move_mesh(solid_meshes.box(size), np.eye(3), place),),
         )
 
     can, points = OBJECTS["can"], seen([TABLE, OBJECTS["can"]])

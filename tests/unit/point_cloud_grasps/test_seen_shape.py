@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from depth_camera import EYE, LYING, Box, Cylinder, Shape, Sphere, seen, turned  # noqa: E402
 
 from point_cloud_grasps.seen_shape import SeenShape, completed_shape  # noqa: E402
-from point_cloud_grasps.segmentation import downsampled, point_spacing  # noqa: E402
+from point_cloud_grasps.segmentation import downsample_points, point_spacing  # noqa: E402
 
 TABLE_M = 0.84
 PIXEL_M = 0.0034  # distance of neighbouring points on the table
@@ -31,7 +31,7 @@ OBJECTS: dict[str, Shape] = {
 def shape_of(name: str, noise_m: float = 0.0, share: float = 1.0) -> SeenShape:
     points = seen([TABLE, OBJECTS[name]], noise_m)
     points = points[(np.abs(points[:, :2] - [X, Y]) < 0.1).all(axis=1) & (points[:, 2] > TABLE_M + 0.006)]
-    points = downsampled(np.random.default_rng(2).permutation(points)[: int(share * len(points))])
+    points = downsample_points(np.random.default_rng(2).permutation(points)[: int(share * len(points))])
     return completed_shape(points, point_spacing(points), TABLE_M)
 
 

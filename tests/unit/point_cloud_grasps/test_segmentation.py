@@ -6,7 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from point_cloud_grasps.segmentation import cluster_labels, downsampled, find_support, has_neighbours, point_spacing
+from point_cloud_grasps.segmentation import (
+    cluster_labels,
+    downsample_points,
+    find_support,
+    has_neighbours,
+    point_spacing,
+)
 
 GENERATOR = np.random.default_rng(1)
 
@@ -58,7 +64,7 @@ def test_a_point_alone_has_no_neighbours_and_the_others_have() -> None:
 
 def test_points_are_thinned_to_one_in_a_cube_at_their_middle() -> None:
     points = np.array([[0.0002, 0.0, 0.0], [0.0012, 0.001, 0.0], [0.0042, 0.0, 0.0]])
-    assert sorted(downsampled(points).tolist()) == [
+    assert sorted(downsample_points(points).tolist()) == [
         [pytest.approx(0.0007), pytest.approx(0.0005), 0.0],
         [pytest.approx(0.0042), 0.0, 0.0],
     ]

@@ -22,7 +22,7 @@ from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_annotations import from_annotation, from_hint
 from modular_framework_core.state_api.option_limits import Finite, Length, Limits, Positive, Share, Vector
-from modular_framework_core.state_api.option_types import Plain
+from modular_framework_core.state_api.option_types import ScalarType
 from modular_framework_core.task_constructor.json_schema import task_schema
 from modular_framework_core.task_constructor.loading import load_state_class
 from modular_framework_core.task_constructor.pipeline import check_task, main
@@ -188,7 +188,7 @@ bounds = st.one_of(st.none(), st.floats(-5.0, 5.0))
 )
 def test_schema_and_check_agree_about_every_number(limits: Limits, number: float) -> None:
     assume(limits.bounds() or math.isfinite(number))  # JSON itself knows no infinity
-    valid = jsonschema.Draft7Validator(Plain("float", limits).schema()).is_valid(number)
+    valid = jsonschema.Draft7Validator(ScalarType("float", limits).schema()).is_valid(number)
     assert (limits.remedy(number) == "") == valid
 
 

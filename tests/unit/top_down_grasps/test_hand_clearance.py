@@ -44,7 +44,7 @@ class Thing:
 def cylinder(diameter: float, height: float) -> Thing:
     place = np.array([0.1, 0.5, height / 2])
     return Thing(
-        surface_points.cylinder(height, diameter / 2).moved(np.eye(3), place),
+        surface_points.cylinder(height, diameter / 2).transformed(np.eye(3), place),
         coal.Cylinder(diameter / 2, height),
         pinocchio.SE3(np.eye(3), place),
     )
@@ -53,7 +53,7 @@ def cylinder(diameter: float, height: float) -> Thing:
 def block(width: float, depth: float, height: float) -> Thing:
     turn, place = rotation_about(UP, 0.4), np.array([0.1, 0.5, height / 2])
     return Thing(
-        surface_points.box((width, depth, height)).moved(turn, place),
+        surface_points.box((width, depth, height)).transformed(turn, place),
         coal.Box(width, depth, height),
         pinocchio.SE3(turn, place),
     )
@@ -138,7 +138,7 @@ def test_a_shape_that_cannot_be_used_is_refused_with_its_link(housing: str) -> N
 
 def test_a_hand_that_cannot_get_past_a_wide_top_is_not_sent_there() -> None:
     gripper: GripperGeometry = measure_gripper(jaws(), "tool", "slide")
-    stem = surface_points.cylinder(0.10, 0.02).moved(np.eye(3), np.array([0.0, 0.0, 0.05]))
-    hat = surface_points.cylinder(0.02, 0.06).moved(np.eye(3), np.array([0.0, 0.0, 0.11]))
-    grasps = top_down_grasps(surface_points.joined([stem, hat]), 0.0, gripper, TopDownSettings())
+    stem = surface_points.cylinder(0.10, 0.02).transformed(np.eye(3), np.array([0.0, 0.0, 0.05]))
+    hat = surface_points.cylinder(0.02, 0.06).transformed(np.eye(3), np.array([0.0, 0.0, 0.11]))
+    grasps = top_down_grasps(surface_points.join_surfaces([stem, hat]), 0.0, gripper, TopDownSettings())
     assert all(grasp.position[2] > 0.12 for grasp in grasps)

@@ -50,8 +50,8 @@ def gripper(urdf: str) -> GripperGeometry:
 
 
 def on_table(surface: Surface, x: float, y: float, yaw: float = 0.0) -> Surface:
-    turned = surface.moved(rotation_about(UP, yaw), np.zeros(3))
-    return turned.moved(np.eye(3), np.array([x, y, TABLE - turned.points[:, 2].min()]))
+    turned = surface.transformed(rotation_about(UP, yaw), np.zeros(3))
+    return turned.transformed(np.eye(3), np.array([x, y, TABLE - turned.points[:, 2].min()]))
 
 
 def test_the_opening_follows_from_the_geometry_of_the_fingers(gripper: GripperGeometry) -> None:
@@ -108,7 +108,7 @@ def test_something_flat_cannot_be_grasped_from_above(gripper: GripperGeometry) -
 
 def test_a_lying_cylinder_is_grasped_across_its_axis_at_its_middle(gripper: GripperGeometry) -> None:
     tipping = rotation_about(np.array([0.0, 1.0, 0.0]), math.pi / 2)
-    lying = surface_points.cylinder(0.14, 0.02).moved(tipping, np.zeros(3))
+    lying = surface_points.cylinder(0.14, 0.02).transformed(tipping, np.zeros(3))
     best = top_down_grasps(on_table(lying, 0.0, 0.5, 0.3), TABLE, gripper, SETTINGS)[0]
     assert abs(math.cos(best.yaw - 0.3)) < 0.05
     assert best.position[:2] == pytest.approx((0.0, 0.5), abs=1e-3)
@@ -133,9 +133,11 @@ def test_a_mesh_gives_the_grasps_of_the_shape_it_draws(gripper: GripperGeometry)
 
 
 def test_an_angle_of_two_boxes_is_grasped_on_one_of_its_legs(gripper: GripperGeometry) -> None:
-    long_leg = surface_points.box((0.03, 0.12, 0.04)).moved(np.eye(3), np.array([-0.045, 0.0, 0.0]))
-    short_leg = surface_points.box((0.09, 0.03, 0.04)).moved(np.eye(3), np.array([0.015, -0.045, 0.0]))
-    grasps = top_down_grasps(on_table(surface_points.joined([long_leg, short_leg]), 0.0, 0.5), TABLE, gripper, SETTINGS)
+    long_leg = surface_points.box((0.03, 0.12, 0.04)).transformed(np.eye(3), np.array([-0.045, 0.0, 0.0]))
+    short_leg = surface_points.box((0.09, 0.03, 0.04)).transformed(np.eye(3), np.array([0.015, -0.045, 0.0]))
+    grasps = top_down_grasps(
+        on_table(surface_points.join_surfaces([long_leg, short_leg]), 0.0, 0.5), TABLE, gripper, SETTINGS
+    )
     assert grasps
     assert min(grasp.width for grasp in grasps) == pytest.approx(0.03, abs=1e-6)
 

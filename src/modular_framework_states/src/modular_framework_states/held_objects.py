@@ -64,7 +64,7 @@ def object_poses(names: Collection[str]) -> dict[str, Pose]:
     return poses
 
 
-def moved(before: Mapping[str, Pose], after: Mapping[str, Pose]) -> bool:
+def have_moved(before: Mapping[str, Pose], after: Mapping[str, Pose]) -> bool:
     """Returns whether an object has moved by more than REST_M or rotated by more than REST_RAD."""
     for name, pose in before.items():
         (start, turn), (end, turned) = (_arrays(item) for item in (pose, after[name]))

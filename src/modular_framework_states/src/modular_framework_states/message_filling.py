@@ -16,7 +16,7 @@ class FillingError(ValueError):
     """A value does not fit a message, or a field does not exist; the message gives the field and its type."""
 
 
-def filled(message_type: Any, values: Mapping[str, Any] | None, userdata: Any = None) -> Any:
+def fill_message(message_type: Any, values: Mapping[str, Any] | None, userdata: Any = None) -> Any:
     """Returns a message filled from a mapping.
 
     Args:

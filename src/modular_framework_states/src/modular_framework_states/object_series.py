@@ -37,11 +37,15 @@ def object_series(prefix: str, names: Iterable[str]) -> list[str]:
     """
     present = set(names)
     stem = f"{prefix}_"
-    numbers = sorted(int(rest) for name in present if (rest := name.removeprefix(stem)) != name and rest.isdecimal())
+    numbers = sorted(
+        int(number_text)
+        for name in present
+        if (number_text := name.removeprefix(stem)) != name and number_text.isdecimal()
+    )
     if len(numbers) < 2 or numbers != list(range(1, len(numbers) + 1)):
-        found = ", ".join(f"{stem}{number}" for number in numbers) or "none"
+        numbered = ", ".join(f"{stem}{number}" for number in numbers) or "none"
         raise SeriesError(
-            f"the planning scene has these objects of '{prefix}': {found}; a tower needs {stem}1, {stem}2, ... without "
-            f"a gap; {listing(sorted(present), 'the planning scene has no objects')}"
+            f"the planning scene has these objects of '{prefix}': {numbered}; a tower needs {stem}1, {stem}2, ... "
+            f"without a gap; {listing(sorted(present), 'the planning scene has no objects')}"
         )
     return [f"{stem}{number}" for number in numbers]

@@ -81,7 +81,7 @@ def read_place_scene(commander: Any, grasp: Any, support: str) -> PlaceScene:
         attached_names = [item.object.id for item in scene.robot_state.attached_collision_objects]
         expected = f"'{grasp.object_id}'" if grasp.object_id else "one object"
         raise PlaceError(f"the hand should hold {expected}; attached objects: {', '.join(attached_names) or 'none'}")
-    support_object = _only(support, scene.world.collision_objects)
+    support_object = _only_object(support, scene.world.collision_objects)
     tip_link, item = commander.group.tip_link, held[0].object
     tip, carrier = link_poses(commander, (tip_link, item.header.frame_id), SERVICE_TIMEOUT_S)
     in_tip = _rotation(tip.pose).inv() * _rotation(carrier.pose) * _rotation(item.pose)
@@ -98,13 +98,13 @@ def read_place_scene(commander: Any, grasp: Any, support: str) -> PlaceScene:
     )
 
 
-def _only(support: str, objects: Sequence[CollisionObject]) -> CollisionObject:
+def _only_object(support: str, objects: Sequence[CollisionObject]) -> CollisionObject:
     matches = [item for item in objects if is_named(item.id, support)]
     if len(matches) != 1:
-        known = sorted(item.id for item in objects)
+        known_ids = sorted(item.id for item in objects)
         raise PlaceError(
-            f"{len(matches)} objects of the planning scene are named '{support}'; {listing(known)}"
-            f"{nearest(support, known)}"
+            f"{len(matches)} objects of the planning scene are named '{support}'; {listing(known_ids)}"
+            f"{nearest(support, known_ids)}"
         )
     return matches[0]
 
@@ -147,7 +147,7 @@ def place_locations(scene: PlaceScene, poses: Sequence[PlacePose], fingers: Mapp
         PlaceLocation(
             id=f"place {index}",
             quality=-float(index),
-            place_pose=_stamped(scene.frame, pose),
+            place_pose=_pose_message(scene.frame, pose),
             pre_place_approach=_translation(scene.frame, (0.0, 0.0, -1.0), APPROACH_M, MIN_APPROACH_M),
             post_place_retreat=_translation(scene.tip_link, scene.retreat, length, MIN_RETREAT * length),
             post_place_posture=opened,
@@ -156,7 +156,7 @@ def place_locations(scene: PlaceScene, poses: Sequence[PlacePose], fingers: Mapp
     ]
 
 
-def _stamped(frame: str, pose: PlacePose) -> PoseStamped:
+def _pose_message(frame: str, pose: PlacePose) -> PoseStamped:
     message = PoseStamped(header=Header(frame_id=frame))
     message.pose.position, message.pose.orientation = Point(*pose.position), Quaternion(*pose.rotation.as_quat())
     return message

@@ -68,16 +68,16 @@ def read_region(name: str, regions: Any) -> TargetRegion:
     """
     if not name:
         return TargetRegion()
-    known = regions if isinstance(regions, Mapping) else {}
-    if name not in known:
-        raise PlaceError(f"region '{name}' does not exist; /regions has: {', '.join(sorted(known)) or 'none'}")
+    known_regions = regions if isinstance(regions, Mapping) else {}
+    if name not in known_regions:
+        raise PlaceError(f"region '{name}' does not exist; /regions has: {', '.join(sorted(known_regions)) or 'none'}")
     try:
-        spans = {axis: (float(low), float(high)) for axis, (low, high) in dict(known[name]).items()}
+        spans = {axis: (float(low), float(high)) for axis, (low, high) in dict(known_regions[name]).items()}
         region = TargetRegion(name=name, **spans)
     except (TypeError, ValueError) as error:
         example = "{x: [0.1, 0.2], y: [0.4, 0.5]}"
         raise PlaceError(
-            f"/regions/{name} is {known[name]!r}; allowed: spans [LOW, HIGH] [m] such as {example}"
+            f"/regions/{name} is {known_regions[name]!r}; allowed: spans [LOW, HIGH] [m] such as {example}"
         ) from error
     return region
 
@@ -181,14 +181,14 @@ def stable_directions(solids: Sequence[TriangleMesh]) -> Array:
     """
     corners = np.vstack([solid.vertices for solid in solids])
     hull, centre = convex_hull(corners), _centre_of_mass(solids)
-    found = []
+    directions = []
     for plane in hull.planes:
         to_down = _shortest_rotation(plane[:3], DOWN)
         face = hull.corners[hull.corners @ plane[:3] + plane[3] > -FLAT_M]
         edges = _edges(to_down.apply(face)[:, :2])
         if edges is not None and np.all(edges[:, :2] @ to_down.apply(centre)[:2] + edges[:, 2] <= 0.0):
-            found.append(plane[:3])
-    return np.array(found).reshape(-1, 3)
+            directions.append(plane[:3])
+    return np.array(directions).reshape(-1, 3)
 
 
 def _centre_of_mass(solids: Sequence[TriangleMesh]) -> Array:
@@ -294,8 +294,10 @@ def _upright(directions: Array, held: Rotation, max_tilt_rad: float) -> list[Rot
     tilts = np.arccos(np.clip(held.apply(directions) @ DOWN, -1.0, 1.0)) if len(directions) else np.zeros(0)
     allowed = [index for index in np.argsort(tilts, kind="stable") if tilts[index] <= max_tilt_rad]
     if not allowed:
-        found = f"{tilts.min():.2f} rad" if len(tilts) else "no stable pose"
-        raise PlaceError(f"the object must be tilted by {found} to stand; allowed: {max_tilt_rad:g} rad (max_tilt)")
+        found_text = f"{tilts.min():.2f} rad" if len(tilts) else "no stable pose"
+        raise PlaceError(
+            f"the object must be tilted by {found_text} to stand; allowed: {max_tilt_rad:g} rad (max_tilt)"
+        )
     return [_shortest_rotation(held.apply(directions[index]), DOWN) * held for index in allowed]
 
 

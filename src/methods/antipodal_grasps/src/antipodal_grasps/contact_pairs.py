@@ -57,14 +57,14 @@ def contact_pairs(
     Returns:
         The pairs in order of alignment, equally aligned pairs in order of their distance from the centre of mass.
     """
-    mesh = solid_meshes.joined(solids)
+    mesh = solid_meshes.join_meshes(solids)
     points, normals = _samples(mesh, settings.surface_samples, generator)
     directions = np.concatenate(
         [-normals, *(_in_cone(-normals, settings.friction, generator) for _ in range(settings.lines_per_sample - 1))]
     )
     origins = np.concatenate([np.tile(points, (settings.lines_per_sample, 1)), np.tile(centroid, (len(points), 1))])
     directions = np.concatenate([directions, -normals])
-    found = []
+    pairs = []
     for origin, direction, crossings in zip(
         origins, directions, line_crossings(mesh, origins, directions), strict=True
     ):
@@ -72,9 +72,9 @@ def contact_pairs(
             alignment = min(float(-entry.normal @ direction), float(end.normal @ direction))
             if end.distance - entry.distance <= max_width and alignment >= settings.cone_cosine:
                 ends = (origin + entry.distance * direction, origin + end.distance * direction)
-                found.append(ContactPair(*ends, alignment))
-    found.sort(key=lambda pair: (-round(pair.alignment, ALIGNMENT_DIGITS), pair.distance_from(centroid)))
-    return distinct_pairs(found, settings)
+                pairs.append(ContactPair(*ends, alignment))
+    pairs.sort(key=lambda pair: (-round(pair.alignment, ALIGNMENT_DIGITS), pair.distance_from(centroid)))
+    return distinct_pairs(pairs, settings)
 
 
 def _samples(mesh: TriangleMesh, count: int, generator: np.random.Generator) -> tuple[Array, Array]:
@@ -106,11 +106,13 @@ def _inside_intervals(crossings: list[Crossing]) -> list[tuple[Crossing, Crossin
     ordered = sorted(crossings, key=lambda crossing: (round(crossing.distance / SAME_POSITION_M), not crossing.enters))
     depth = 0
     entries: list[Crossing] = []
-    found: list[tuple[Crossing, Crossing]] = []
+    intervals: list[tuple[Crossing, Crossing]] = []
     for crossing in ordered:
         if crossing.enters and depth == 0:
             entries.append(crossing)
         depth += 1 if crossing.enters else -1
         if depth == 0:
-            found += [(entry, crossing) for entry in entries if crossing.distance - entry.distance > SAME_POSITION_M]
-    return found if depth == 0 else []
+            intervals += [
+                (entry, crossing) for entry in entries if crossing.distance - entry.distance > SAME_POSITION_M
+            ]
+    return intervals if depth == 0 else []

@@ -46,7 +46,7 @@ def line_crossings(mesh: TriangleMesh, origins: Array, directions: Array) -> lis
     lengths = np.linalg.norm(normals, axis=1)
     corners, normals = corners[lengths > 0.0], normals[lengths > 0.0]
     units = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    found: list[list[Crossing]] = []
+    crossings: list[list[Crossing]] = []
     batch = max(1, BATCH // max(1, len(corners)))
     for start in range(0, len(origins), batch):
         along = directions[start : start + batch]
@@ -54,13 +54,13 @@ def line_crossings(mesh: TriangleMesh, origins: Array, directions: Array) -> lis
         for row in range(len(along)):
             hit_indices = np.flatnonzero(hits[row])
             hit_indices = hit_indices[np.argsort(distances[row, hit_indices], kind="stable")]
-            found.append(
+            crossings.append(
                 [
                     Crossing(float(distances[row, number]), units[number], bool(units[number] @ along[row] < 0.0))
                     for number in hit_indices
                 ]
             )
-    return found
+    return crossings
 
 
 def _intersect(

@@ -28,7 +28,7 @@ from point_cloud_grasps.seen_shape import SeenShape, completed_shape
 from point_cloud_grasps.segmentation import (
     SupportPlane,
     cluster_labels,
-    downsampled,
+    downsample_points,
     find_support,
     has_neighbours,
     point_spacing,
@@ -71,7 +71,7 @@ class Region:
     low: Array
     high: Array
 
-    def padded(self, margin: float) -> Region:
+    def extended_by(self, margin: float) -> Region:
         """Returns the region extended by a margin on each side [m]."""
         return Region(self.low - margin, self.high + margin)
 
@@ -88,13 +88,13 @@ def cluster_gap(spacing: float) -> float:
 def object_region(target: SceneObject, settings: CloudSettings) -> Region:
     """Returns the region in which the points of an object are searched."""
     points = target.surface.points
-    return Region(points.min(axis=0), points.max(axis=0)).padded(settings.region_padding_m)
+    return Region(points.min(axis=0), points.max(axis=0)).extended_by(settings.region_padding_m)
 
 
 def relevant_region(query: GraspQuery, settings: CloudSettings) -> Region:
     """Returns the region of the relevant points: the object's region, extended by the reach of the approaching hand."""
     hand = max(float(np.linalg.norm(part.corners.reshape(-1, 3), axis=1).max()) for part in query.gripper.parts)
-    return object_region(query.target, settings).padded(hand + settings.hand.approach_distance_m)
+    return object_region(query.target, settings).extended_by(hand + settings.hand.approach_distance_m)
 
 
 def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> list[PairGrasp]:
@@ -112,19 +112,19 @@ def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> l
         NoCandidatesError: The object has no feasible grasp; the message gives the reason.
     """
     generator = np.random.default_rng(query.seed)
-    points = downsampled(points[relevant_region(query, settings).contains(points)])
-    support = _support(query, points, generator)
+    points = downsample_points(points[relevant_region(query, settings).contains(points)])
+    support = _support_height(query, points, generator)
     points = points[support.heights(points) > settings.min_height_m]
     points, spacing = _surface_points(query, points, settings)
     own = _own_points(query, points, spacing, settings)
     target_points = points[own]
     support_z = support.z_at(*target_points[:, :2].mean(axis=0).tolist())
     shape = completed_shape(target_points, spacing, support_z)
-    seen = SceneObject(query.target.name, shape.surface)
-    others = _columns(points[~own], support_z)
-    obstacles = (*query.obstacles, others) if others else query.obstacles
-    seen_query = replace(query, target=seen, obstacles=obstacles, support_z=support_z)
-    pairs = _pairs(shape, query.gripper, settings, generator)
+    seen_object = SceneObject(query.target.name, shape.surface)
+    obstacle_points = _columns(points[~own], support_z)
+    obstacles = (*query.obstacles, obstacle_points) if obstacle_points else query.obstacles
+    seen_query = replace(query, target=seen_object, obstacles=obstacles, support_z=support_z)
+    pairs = _sample_pairs(shape, query.gripper, settings, generator)
     grasps = grasps_on_pairs(pairs, seen_query, settings)
     if not grasps:
         raise NoCandidatesError(
@@ -134,7 +134,7 @@ def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> l
     return grasps
 
 
-def _support(query: GraspQuery, points: Array, generator: np.random.Generator) -> SupportPlane:
+def _support_height(query: GraspQuery, points: Array, generator: np.random.Generator) -> SupportPlane:
     """Returns the support plane in the cloud; if it is not visible, the support of the planning scene."""
     around = points[np.abs(points[:, 2] - query.support_z) <= SUPPORT_SEARCH_M]
     return find_support(around, generator) or SupportPlane(np.array([0.0, 0.0, 1.0]), query.support_z)
@@ -149,11 +149,11 @@ def _surface_points(query: GraspQuery, points: Array, settings: CloudSettings) -
     region = object_region(query.target, settings)
     spacing = point_spacing(points[region.contains(points)])
     points = points[has_neighbours(points, spacing)] if len(points) else points
-    found = int(region.contains(points).sum())
-    if found < MIN_POINTS:
+    point_count = int(region.contains(points).sum())
+    if point_count < MIN_POINTS:
         low, high = (", ".join(f"{value:.3f}" for value in end) for end in (region.low, region.high))
         raise NoCandidatesError(
-            f"the cloud has {found} points on '{query.target.name}', at least {MIN_POINTS} are needed, more than "
+            f"the cloud has {point_count} points on '{query.target.name}', at least {MIN_POINTS} are needed, more than "
             f"{settings.min_height_m * 1000:.0f} mm above its support and off the robot, between ({low}) and "
             f"({high}) m; is the object in view of the camera and not occluded?"
         )
@@ -173,33 +173,33 @@ def _own_points(query: GraspQuery, points: Array, spacing: float, settings: Clou
     return own if own.sum() >= MIN_POINTS else inside
 
 
-def _pairs(
+def _sample_pairs(
     shape: SeenShape, gripper: GripperGeometry, settings: CloudSettings, generator: np.random.Generator
 ) -> list[ContactPair]:
     surface = shape.surface
-    known = shape.unseen_m <= gripper.pad_half_height
+    is_seen = shape.unseen_m <= gripper.pad_half_height
     widest = settings.widest(gripper)
-    found = sample_pairs(
-        surface.points[known],
-        surface.normals[known],
+    found_pairs = sample_pairs(
+        surface.points[is_seen],
+        surface.normals[is_seen],
         surface.centroid,
         widest,
         settings=settings.pairs,
         generator=generator,
     )
-    if found.pairs:
-        return found.pairs
+    if found_pairs.pairs:
+        return found_pairs.pairs
     opening = (
         f"the gripper opens to {gripper.max_opening * 1000:.0f} mm, of which {widest * 1000:.0f} mm remain with a "
         f"clearance of {settings.hand.min_finger_clearance_m * 1000:.0f} mm on each side"
     )
-    if math.isinf(found.narrowest_m):
+    if math.isinf(found_pairs.narrowest_m):
         raise NoCandidatesError(
-            f"none of {int(known.sum())} visible contacts face each other within the friction cone of "
+            f"none of {int(is_seen.sum())} visible contacts face each other within the friction cone of "
             f"{settings.pairs.friction:g}; {opening}"
         )
     raise NoCandidatesError(
-        f"no contact pair fits: the narrowest is {found.narrowest_m * 1000:.0f} mm wide, and {opening}"
+        f"no contact pair fits: the narrowest is {found_pairs.narrowest_m * 1000:.0f} mm wide, and {opening}"
     )
 
 

@@ -82,8 +82,8 @@ def sample_pairs(
     extent = float(np.linalg.norm(np.ptp(points, axis=0)))
     squareness = (alignments - settings.cone_cosine) / (1.0 - settings.cone_cosine)
     best = np.argsort(offsets / extent - squareness, kind="stable")[: settings.max_pairs]
-    found = (
+    pair_order = (
         ContactPair(points[first_index], points[second_index], float(alignment))
         for first_index, second_index, alignment in zip(first[best], second[best], alignments[best], strict=True)
     )
-    return FoundPairs(distinct_pairs(found, settings), narrowest)
+    return FoundPairs(distinct_pairs(pair_order, settings), narrowest)

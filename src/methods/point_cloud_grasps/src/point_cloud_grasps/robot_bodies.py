@@ -38,7 +38,7 @@ class RobotBodies:
         for link in links:
             for collision in link.collisions:
                 try:
-                    body = collision_body(collision).moved(collision.origin.matrix())
+                    body = collision_body(collision).transformed(collision.origin.matrix())
                     self._bodies.setdefault(link.name, []).append(body)
                 except ShapeError as error:
                     self.faults.append(f"the collision shape of link '{link.name}' {error}")
@@ -55,7 +55,7 @@ class RobotBodies:
         hidden = np.zeros(len(points), dtype=bool)
         for link, pose in poses.items():
             for body in self._bodies.get(link, []):
-                placed = body.moved(pose)
+                placed = body.transformed(pose)
                 low, high = placed.corners.min(axis=0) - padding, placed.corners.max(axis=0) + padding
                 near = np.flatnonzero(~hidden & ((points >= low) & (points <= high)).all(axis=1))
                 beyond = points[near] @ placed.planes[:, :3].T + placed.planes[:, 3]

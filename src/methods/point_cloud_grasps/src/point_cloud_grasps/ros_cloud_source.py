@@ -118,11 +118,11 @@ class CloudSource:
         If time is held, only a message with that exact stamp counts; a later stamp comes from before a world reset.
         """
         held, messages = self._time.now(), list[PointCloud2]()
-        begun = held or rospy.Time.now()
+        start_time = held or rospy.Time.now()
 
         def keep(message: PointCloud2) -> None:
             stamp = message.header.stamp
-            if stamp.is_zero() or stamp == begun or (held is None and stamp > begun):
+            if stamp.is_zero() or stamp == start_time or (held is None and stamp > start_time):
                 messages.append(message)
 
         subscriber = rospy.Subscriber(topic, PointCloud2, keep, queue_size=1, buff_size=BUFFER_BYTES)

@@ -62,13 +62,13 @@ class PointCloudMethod(ParameterisedMethod):
             NoCandidatesError: The object has no feasible grasp; the message gives the reason.
         """
         settings = read_cloud_settings(self.read)
-        begun = time.perf_counter()
+        start_s = time.perf_counter()
         points = self._points(relevant_region(query, settings))
-        taken = time.perf_counter()
+        cloud_taken_s = time.perf_counter()
         grasps = cloud_grasps(query, points, settings)
         rospy.logdebug(
             "%d points around '%s': %d grasps; cloud %.2f s, search %.2f s",
-            len(points), query.target.name, len(grasps), taken - begun, time.perf_counter() - taken,
+            len(points), query.target.name, len(grasps), cloud_taken_s - start_s, time.perf_counter() - cloud_taken_s,
         )  # fmt: skip
         return candidates_of(grasps, query.gripper, settings)
 

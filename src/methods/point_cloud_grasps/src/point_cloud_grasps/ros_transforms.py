@@ -59,17 +59,17 @@ class Transforms:
             stamp: Requested time.
             timeout_s: Maximum wait for transforms at this time [s of real time].
         """
-        known = [source for source in sources if self._is_known(frame, source, rospy.Time(0))] or list(sources)
-        wait_until(lambda: all(self._is_known(frame, source, stamp) for source in known), timeout_s)
-        found = {}
+        known_sources = [source for source in sources if self._is_known(frame, source, rospy.Time(0))] or list(sources)
+        wait_until(lambda: all(self._is_known(frame, source, stamp) for source in known_sources), timeout_s)
+        stamp_of_source = {}
         for source in sources:
             if self._is_known(frame, source, stamp):
-                found[source] = stamp
+                stamp_of_source[source] = stamp
             elif self._is_known(frame, source, rospy.Time(0)):
                 latest = self._buffer.get_latest_common_time(frame, source)
                 if abs((stamp - latest).to_sec()) <= LATE_TRANSFORM_S:
-                    found[source] = latest
-        return found
+                    stamp_of_source[source] = latest
+        return stamp_of_source
 
     def matrix(self, frame: str, source: str, stamp: rospy.Time) -> Array:
         """Returns a transform, shape (4, 4).
@@ -79,9 +79,9 @@ class Transforms:
             source: Source frame.
             stamp: Time returned by :meth:`stamps`.
         """
-        found = self._buffer.lookup_transform_core(frame, source, stamp).transform
+        transform = self._buffer.lookup_transform_core(frame, source, stamp).transform
         matrix = np.eye(4)
-        rotation, translation = found.rotation, found.translation
+        rotation, translation = transform.rotation, transform.translation
         matrix[:3, :3] = Rotation.from_quat([rotation.x, rotation.y, rotation.z, rotation.w]).as_matrix()
         matrix[:3, 3] = translation.x, translation.y, translation.z
         return matrix

@@ -10,7 +10,13 @@ from modular_framework_core.grasp_generation.grasp_candidates import NoCandidate
 from modular_framework_core.grasp_generation.planning_scene_objects import CropBox, SceneObject
 from modular_framework_core.grasp_generation.surface_points import Surface
 from point_cloud_grasps.cloud_grasps import CloudSettings, Region, cluster_gap
-from point_cloud_grasps.segmentation import cluster_labels, downsampled, find_support, has_neighbours, point_spacing
+from point_cloud_grasps.segmentation import (
+    cluster_labels,
+    downsample_points,
+    find_support,
+    has_neighbours,
+    point_spacing,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +46,7 @@ def seen_objects(points: Array, crop: CropBox, settings: CloudSettings, seed: in
     Raises:
         NoCandidatesError: The cloud has no support plane or no object on it.
     """
-    points = downsampled(points[crop_region(crop).contains(points)])
+    points = downsample_points(points[crop_region(crop).contains(points)])
     support = find_support(points, np.random.default_rng(seed))
     if support is None:
         raise NoCandidatesError(

@@ -77,11 +77,14 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     beyond = _standard_quantile(smooth[tuple(border.T)]) * sigma
     offsets = np.array([*low, support_z - MARGIN * cell]) + cell / 2
     positions = border * cell + offsets + normals * (beyond * cell)[:, None]
-    kept = positions[:, 2] >= support_z
+    is_above_support = positions[:, 2] >= support_z
     edges = np.where(tops > support_z, tops, ndimage.maximum_filter(tops, 3))
     unseen = np.maximum(0.0, edges[border[:, 0], border[:, 1]] - positions[:, 2])
     volume, centroid = _solid(filled, cell, offsets, support_z)
-    return SeenShape(Surface(positions[kept], normals[kept], volume, centroid, np.zeros((0, 3))), unseen[kept])
+    return SeenShape(
+        Surface(positions[is_above_support], normals[is_above_support], volume, centroid, np.zeros((0, 3))),
+        unseen[is_above_support],
+    )
 
 
 def _column_tops(points: Array, radius: float, cell: float, support_z: float) -> tuple[Array, Array]:

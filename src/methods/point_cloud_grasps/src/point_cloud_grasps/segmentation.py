@@ -47,7 +47,7 @@ class SupportPlane:
         return float((self.offset - self.normal[0] * x - self.normal[1] * y) / self.normal[2])
 
 
-def downsampled(points: Array) -> Array:
+def downsample_points(points: Array) -> Array:
     """Returns the mean of the points (n, 3) in each voxel of 2 mm."""
     if not len(points):
         return points

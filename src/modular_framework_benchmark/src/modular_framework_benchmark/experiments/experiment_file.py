@@ -118,7 +118,7 @@ def read_experiment(
     reading = Reading(faults, path.resolve().parent, resources)
     experiment = _Reader(root, text, path, reading=reading, known_metrics=known_metrics, checks=checks or {}).read()
     if experiment is None:
-        raise ExperimentFault(faults.sorted())
+        raise ExperimentFault(faults.sorted_faults())
     return experiment
 
 
@@ -394,7 +394,7 @@ def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> tuple[int, Stop
     node = entries.get("stopping")
     stopping = read_stopping(node, metrics, reading) if isinstance(node, Mapping) else Stopping()
     if len(faults):
-        raise ExperimentFault(faults.sorted())
+        raise ExperimentFault(faults.sorted_faults())
     return workers or 1, stopping
 
 

@@ -223,7 +223,7 @@ def perturbations_of(text: str) -> Perturbations | None:
         return None
     perturbations = PerturbReader(ValueReading(faults), seed_of(root)).read(root.entries["perturb"])
     if perturbations is None:
-        raise ExperimentFault(faults.sorted())
+        raise ExperimentFault(faults.sorted_faults())
     return perturbations
 
 

@@ -197,13 +197,13 @@ class ArmCommander:
         pipeline, _, planner = str(planner_id).rpartition("/")
         available = self._planners() if planner_id else {}
         if pipeline and pipeline not in available:
-            known = listing(sorted(available))
-            raise CommanderError(f"There is no pipeline '{pipeline}'; {known}{nearest(pipeline, available)}")
+            known_planners = listing(sorted(available))
+            raise CommanderError(f"There is no pipeline '{pipeline}'; {known_planners}{nearest(pipeline, available)}")
         matches = [name for name, planners in available.items() if planner in planners or (pipeline and not planners)]
         if planner_id and not (pipeline in matches if pipeline else matches):
-            known = self.planner_names()
+            names = self.planner_names()
             raise CommanderError(
-                f"There is no planner '{planner_id}'; {listing(known)}{nearest(str(planner_id), known)}"
+                f"There is no planner '{planner_id}'; {listing(names)}{nearest(str(planner_id), names)}"
             )
         self._pipeline_id = pipeline or (matches[0] if len(matches) == 1 else "")
         self._planner_id = planner

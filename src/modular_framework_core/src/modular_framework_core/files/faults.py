@@ -82,27 +82,27 @@ class FaultList:
         self._explained.add(location)
 
     def add_unknown(
-        self, location: SourceLocation, noun: str, found: str, allowed: Iterable[str], used: Container[str] = ()
+        self, location: SourceLocation, noun: str, found_text: str, allowed: Iterable[str], used: Container[str] = ()
     ) -> None:
         """Adds a fault for an unknown name, with a similar allowed name as a suggestion.
 
         Args:
             location: Position of the name.
             noun: Noun phrase for the name, such as ``outcome``.
-            found: Unknown name.
+            found_text: Unknown name.
             allowed: Allowed names.
             used: Names that are already used in the same mapping, and are therefore not suggested.
         """
         names = list(dict.fromkeys(allowed))
         unused = [name for name in names if name not in used]
-        self.add(location, f"{noun} '{found}' is unknown; {listing(names)}{nearest(found, unused)}")
+        self.add(location, f"{noun} '{found_text}' is unknown; {listing(names)}{nearest(found_text, unused)}")
 
     def extend(self, other: FaultList) -> None:
         """Adds the faults of another list."""
         for fault in other._faults:
             self.add(fault.location, fault.message)
 
-    def sorted(self) -> tuple[Fault, ...]:
+    def sorted_faults(self) -> tuple[Fault, ...]:
         """Returns the distinct faults, sorted by location."""
         return tuple(sorted(set(self._faults)))
 

@@ -276,7 +276,7 @@ class _Reader:
             key = None if is_merge else self._key(self._node(event))
             value = self._node(next(self._events))
             if is_merge:
-                merged += self._merged(value)
+                merged += self._merged_mappings(value)
             elif key in entries:
                 self._faults.add(
                     key_location, f"the key '{key}' is given twice; first in line {keys[key].line}; remove one of them"
@@ -289,7 +289,7 @@ class _Reader:
                     entries[key], keys[key] = other.entries[key], other.keys[key]
         return Mapping(entries, keys, location)
 
-    def _merged(self, value: Node) -> list[Mapping]:
+    def _merged_mappings(self, value: Node) -> list[Mapping]:
         items = list(value.items) if isinstance(value, Sequence) else [value]
         mappings = [item for item in items if isinstance(item, Mapping)]
         if len(mappings) != len(items):

@@ -61,12 +61,12 @@ class Entry:
         if not isinstance(self.node, yaml.MappingNode):
             raise self.fault(f"got {describe(self.node)}, expected a mapping of keys to values")
         entries: list[Entry] = []
-        seen: set[str] = set()
+        seen_keys: set[str] = set()
         for key_node, value_node in self.node.value:
             entry = Entry(self.path, int(key_node.start_mark.line) + 1, str(key_node.value), value_node)
-            if entry.key in seen:
+            if entry.key in seen_keys:
                 raise entry.fault(f"the key occurs twice in '{self.key}'; keep one of them")
-            seen.add(entry.key)
+            seen_keys.add(entry.key)
             entries.append(entry)
         return entries
 
@@ -146,13 +146,13 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         return
     if not isinstance(root, yaml.MappingNode):
         raise EntryError(path, 1, f"the top level is {describe(root)}, expected a mapping of names to entries")
-    seen: set[str] = set()
+    seen_names: set[str] = set()
     for key_node, value_node in root.value:
         entry = Entry(path, int(key_node.start_mark.line) + 1, str(key_node.value), value_node)
-        if entry.key in seen:
+        if entry.key in seen_names:
             yield entry.fault("this name occurs earlier in the file; rename one of the two entries")
             continue
-        seen.add(entry.key)
+        seen_names.add(entry.key)
         yield entry
 
 

@@ -40,7 +40,7 @@ class ConvexBody:
     corners: Array
     planes: Array
 
-    def moved(self, transform: Array) -> ConvexBody:
+    def transformed(self, transform: Array) -> ConvexBody:
         """Returns the body after a transform of shape (4, 4)."""
         normals = self.planes[:, :3] @ transform[:3, :3].T
         offsets = self.planes[:, 3] - normals @ transform[:3, 3]

@@ -30,7 +30,7 @@ from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
 
 Array = npt.NDArray[np.float64]
-SAMPLES = 200
+STROKE_SAMPLES = 200
 FULL_STROKE = 0.9  # minimum stroke of the pads, as a fraction of the longest stroke of all pairs
 
 
@@ -54,7 +54,7 @@ class HandPart:
     planes: Array
     is_pad: bool = False
 
-    def turned(self, axes: Array) -> HandPart:
+    def in_axes(self, axes: Array) -> HandPart:
         """Returns the part in a frame whose axes are the columns of a matrix of shape (3, 3)."""
         planes = np.concatenate([self.planes[:, :, :3] @ axes, self.planes[:, :, 3:]], axis=2)
         return HandPart(self.link, self.corners @ axes, planes, self.is_pad)
@@ -182,11 +182,11 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
             f"the robot description lacks the joint '{joint}' with limits, or the link "
             f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame"
         )
-    positions = np.linspace(limit.lower, limit.upper, SAMPLES)
+    positions = np.linspace(limit.lower, limit.upper, STROKE_SAMPLES)
     moving = model.moving_links(joint)
-    parts = list(_parts(model, grasp_link, joint, positions))
+    parts = list(_hand_parts(model, grasp_link, joint, positions))
     axes = _hand_axes(parts, moving, model.origin_of_fingers(grasp_link, joint))
-    parts = [part.turned(axes) for part in parts]
+    parts = [part.in_axes(axes) for part in parts]
     fingers = [part for part in parts if part.link in moving]
     right, left = _pads(fingers)
     openings = np.maximum(right.corners[:, :, 0].min(axis=1) - left.corners[:, :, 0].max(axis=1), 0.0)
@@ -231,7 +231,9 @@ def _hand_axes(parts: list[HandPart], moving: list[str], origin: Array) -> Array
 
 def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
     """Returns the pad on the positive side and the pad on the negative side of the closing direction x."""
-    spread = max(range(SAMPLES), key=lambda sample: np.ptp([part.corners[sample, :, 0].mean() for part in fingers]))
+    spread = max(
+        range(STROKE_SAMPLES), key=lambda sample: np.ptp([part.corners[sample, :, 0].mean() for part in fingers])
+    )
     right = [part for part in fingers if part.corners[spread, :, 0].mean() > 0]
     left = [part for part in fingers if part.corners[spread, :, 0].mean() <= 0]
     gaps = {
@@ -260,7 +262,7 @@ def _face_each_other(corners: Array, others: Array) -> bool:
     return bool((low[1:] < high[1:]).all())
 
 
-def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
+def _hand_parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
     """Places the collision shapes of the hand in the grasp frame, at every joint position."""
     driven = model.driven_joints(joint)
     for link in model.hand_links(joint):
@@ -331,7 +333,7 @@ class _Model:
         """Yields the collision shapes of a link in the link frame."""
         for collision in self.links[link].collisions:
             try:
-                yield collision_body(collision).moved(collision.origin.matrix())
+                yield collision_body(collision).transformed(collision.origin.matrix())
             except ShapeError as error:
                 raise GripperGeometryError(f"the collision shape of link '{link}' {error}") from error
 

@@ -116,7 +116,7 @@ def place_hand(
         gripper: Geometry of the hand.
         settings: Settings of the hand pose.
     """
-    view = _View.along(pair, axes, surface, gripper, settings)
+    view = _PairView.along(pair, axes, surface, gripper, settings)
     pad_offset = gripper.pad_centre_at(pair.width)
     farthest = pad_offset + gripper.pad_half_height - settings.min_pad_overlap_m / 2
     height = pad_offset
@@ -138,7 +138,7 @@ def place_hand(
 
 
 @dataclass(frozen=True, slots=True)
-class _View:
+class _PairView:
     """Object in a frame at the midpoint of the pair: x closing, y across, z against the approach direction.
 
     Attributes:
@@ -162,7 +162,7 @@ class _View:
     @classmethod
     def along(
         cls, pair: ContactPair, axes: Array, surface: Surface, gripper: GripperGeometry, settings: HandSettings
-    ) -> _View:
+    ) -> _PairView:
         frame = axes * [1.0, -1.0, -1.0]
         points = (surface.points - pair.middle) @ frame
         between = (np.abs(points[:, 1]) <= gripper.pad_half_width) & (
@@ -178,7 +178,7 @@ class _View:
             settings=settings,
         )
 
-    def hold_at(self, height: float, pad_offset: float) -> _Hold | None:
+    def hold_at(self, height: float, pad_offset: float) -> _PairHold | None:
         pad_z = height - pad_offset
         points, gripper, settings = self.points, self.gripper, self.settings
         touching = np.abs(points[:, 2] - pad_z) <= gripper.pad_half_height
@@ -200,9 +200,9 @@ class _View:
             return None
         passed = points[points[:, 2] >= pad_z - gripper.pad_half_height, 0]
         passage = passage_between(x, passed, gripper, settings)
-        return None if passage is None else _Hold(low, high, alignment, overlap, passage)
+        return None if passage is None else _PairHold(low, high, alignment, overlap, passage)
 
-    def height_over_support(self, hold: _Hold, opening: float, support_z: float) -> float:
+    def height_over_support(self, hold: _PairHold, opening: float, support_z: float) -> float:
         """Returns the minimum height of the grasp frame at which the hand keeps its clearance from the support [m]."""
         gripper, axes = self.gripper, self.axes
         samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
@@ -215,7 +215,7 @@ class _View:
             return missing / lift
         return -math.inf if missing + max(0.0, -lift) * gripper.max_tip <= 0.0 else math.inf
 
-    def pose(self, hold: _Hold, height: float, opening: float) -> HandPose:
+    def pose(self, hold: _PairHold, height: float, opening: float) -> HandPose:
         frame = self.axes * [1.0, -1.0, -1.0]
         return HandPose(
             position=self.pair.middle + frame @ [hold.passage.middle, 0.0, height],
@@ -229,7 +229,7 @@ class _View:
 
 
 @dataclass(frozen=True, slots=True)
-class _Hold:
+class _PairHold:
     """Contact of the pads at one height: contact centre of each side, alignment, overlap, and passage."""
 
     low: Array

@@ -24,7 +24,7 @@ from modular_framework_core.grasp_generation.obstacle_clearance import ObstacleC
 
 T = TypeVar("T")
 
-CENTRED_M = 0.06
+MAX_OFFSET_M = 0.06
 """Distance of the closing axis from the centre of mass beyond which a grasp counts as not centred."""
 ANGLE_BINS = 4
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
@@ -99,10 +99,10 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
             pose.position, pose.axes, (pose.opening, pose.width), settings.hand.approach_distance_m
         )
         if clearance > 0.0:
-            grasps.append(_ranked(pose, clearance, query, settings))
+            grasps.append(_rate_grasp(pose, clearance, query, settings))
             if len(grasps) >= settings.max_candidates:
                 break
-    return _interleaved([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
+    return _interleave_angle_bins([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
 
 
 def candidates_of(
@@ -141,14 +141,14 @@ def _poses_to_try(
     centroid = query.target.surface.centroid
     tries = []
     for pair in pairs:
-        score = settings.squareness(pair.alignment) + _centred(pair.distance_from(centroid))
+        score = settings.squareness(pair.alignment) + _centring_quality(pair.distance_from(centroid))
         for axes in hand_axes_for(pair.axis, settings.hand):
             angle = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
             tries.append((angle, score, (pair, axes)))
-    yield from _interleaved(tries, settings)
+    yield from _interleave_angle_bins(tries, settings)
 
 
-def _interleaved(items: list[tuple[float, float, T]], settings: PairGraspSettings) -> list[T]:
+def _interleave_angle_bins(items: list[tuple[float, float, T]], settings: PairGraspSettings) -> list[T]:
     """Orders items (approach angle, score, item): the best item of each bin of angles, then the second best, ..."""
     width = settings.hand.max_approach_angle_rad / ANGLE_BINS
     bins: list[list[tuple[float, float, T]]] = [[] for _ in range(ANGLE_BINS)]
@@ -158,14 +158,14 @@ def _interleaved(items: list[tuple[float, float, T]], settings: PairGraspSetting
     return [item[2] for rank in itertools.zip_longest(*ranked_bins) for item in rank if item is not None]
 
 
-def _ranked(pose: HandPose, clearance: float, query: GraspQuery, settings: PairGraspSettings) -> PairGrasp:
+def _rate_grasp(pose: HandPose, clearance: float, query: GraspQuery, settings: PairGraspSettings) -> PairGrasp:
     gripper: GripperGeometry = query.gripper
     axis = pose.axes[:, 0]
     from_centre = query.target.surface.centroid - pose.contacts.mean(axis=0)
     offset = float(np.linalg.norm(from_centre - axis * (from_centre @ axis)))
     quality = (
         0.25 * settings.squareness(pose.alignment)
-        + 0.25 * _centred(offset)
+        + 0.25 * _centring_quality(offset)
         + 0.25 * min(1.0, clearance / settings.full_clearance_m)
         + 0.15 * min(1.0, pose.overlap / (2 * gripper.pad_half_height))
         + 0.10 * (gripper.max_opening - pose.opening) / gripper.max_opening
@@ -173,5 +173,5 @@ def _ranked(pose: HandPose, clearance: float, query: GraspQuery, settings: PairG
     return PairGrasp(pose, clearance, offset, quality)
 
 
-def _centred(offset: float) -> float:
-    return 1.0 - min(1.0, offset / CENTRED_M)
+def _centring_quality(offset: float) -> float:
+    return 1.0 - min(1.0, offset / MAX_OFFSET_M)

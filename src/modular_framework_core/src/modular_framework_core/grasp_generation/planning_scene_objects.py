@@ -73,30 +73,32 @@ def _translation(position: Any) -> npt.NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class _ScenePart:
     """Part of an object: points on the surface, and the mesh."""
 
     surface: Surface
     solid: TriangleMesh
 
-    def placed(self, pose: Any) -> _Part:
+    def at_pose(self, pose: Any) -> _ScenePart:
         rotation, translation = rotation_matrix(pose.orientation), _translation(pose.position)
-        return _Part(self.surface.moved(rotation, translation), solid_meshes.moved(self.solid, rotation, translation))
+        return _ScenePart(
+            self.surface.transformed(rotation, translation), solid_meshes.move_mesh(self.solid, rotation, translation)
+        )
 
 
-def _primitive(primitive: Any, where: str) -> _Part:
+def _primitive(primitive: Any, where: str) -> _ScenePart:
     sizes = list(primitive.dimensions)
     if not sizes or min(sizes) <= 0.0:
         raise SceneObjectError(f"{where} has the dimensions {sizes}; all must be positive")
     match primitive.type, len(sizes):
         case (1, 3):
-            return _Part(surface_points.box(sizes), solid_meshes.box(sizes))
+            return _ScenePart(surface_points.box(sizes), solid_meshes.box(sizes))
         case (2, 1):
-            return _Part(surface_points.sphere(sizes[0]), solid_meshes.sphere(sizes[0]))
+            return _ScenePart(surface_points.sphere(sizes[0]), solid_meshes.sphere(sizes[0]))
         case (3, 2):
-            return _Part(surface_points.cylinder(sizes[0], sizes[1]), solid_meshes.cylinder(sizes[0], sizes[1]))
+            return _ScenePart(surface_points.cylinder(sizes[0], sizes[1]), solid_meshes.cylinder(sizes[0], sizes[1]))
         case (4, 2):
-            return _Part(surface_points.cylinder(sizes[0], sizes[1], 0.0), solid_meshes.cone(sizes[0], sizes[1]))
+            return _ScenePart(surface_points.cylinder(sizes[0], sizes[1], 0.0), solid_meshes.cone(sizes[0], sizes[1]))
         case _:
             raise SceneObjectError(
                 f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed: box "
@@ -117,7 +119,7 @@ def scene_object(message: Any) -> SceneObject | None:
         SceneObjectError: A part is invalid.
     """
     parts = [
-        _primitive(shape, f"object '{message.id}', primitive {number}").placed(pose)
+        _primitive(shape, f"object '{message.id}', primitive {number}").at_pose(pose)
         for number, (shape, pose) in enumerate(zip(message.primitives, message.primitive_poses, strict=True))
     ]
     for shape, pose in zip(message.meshes, message.mesh_poses, strict=True):
@@ -129,9 +131,9 @@ def scene_object(message: Any) -> SceneObject | None:
                 "triangles; a mesh needs triangles, and vertices for all indices"
             )
         solid = solid_meshes.outward(TriangleMesh(vertices, triangles))
-        parts.append(_Part(surface_points.mesh(vertices, triangles), solid).placed(pose))
+        parts.append(_ScenePart(surface_points.mesh(vertices, triangles), solid).at_pose(pose))
     if not parts:
         return None
-    placed = [part.placed(message.pose) for part in parts]
-    surface = surface_points.joined([part.surface for part in placed])
+    placed = [part.at_pose(message.pose) for part in parts]
+    surface = surface_points.join_surfaces([part.surface for part in placed])
     return SceneObject(message.id, surface, tuple(part.solid for part in placed))

@@ -53,7 +53,7 @@ WAITING_TASK = "/task/wait_for_start"
 """Parameter that is true if the task waits for a start request."""
 
 
-class Kept(Enum):
+class KeptGrasps(Enum):
     """Grasps of the last generation that a request keeps, if no object has moved since the generation."""
 
     NONE = "no grasps"
@@ -62,11 +62,11 @@ class Kept(Enum):
 
 
 SERVICES = {
-    "generate_grasps": Kept.NONE,
-    "~generate": Kept.NONE,
-    "refresh_grasps": Kept.LEFT,
-    "~refresh": Kept.LEFT,
-    f"{SIGNAL_TOPIC}/renew": Kept.COMPLETE,
+    "generate_grasps": KeptGrasps.NONE,
+    "~generate": KeptGrasps.NONE,
+    "refresh_grasps": KeptGrasps.LEFT,
+    "~refresh": KeptGrasps.LEFT,
+    f"{SIGNAL_TOPIC}/renew": KeptGrasps.COMPLETE,
 }
 
 
@@ -157,7 +157,7 @@ class GraspGenerator:
                 # a concurrent request reads the scene later, so its grasps replace the grasps of this reading
                 with self._generating if self._time.enabled else nullcontext():
                     objects = self._scene.targets(settings)
-                    self._generated.keep({found.name for found in objects} | self._scene.attached)
+                    self._generated.keep({item.name for item in objects} | self._scene.attached)
                     scene_was_read = True
                     if self._generated.stale(objects):
                         wait_limit = wait_limit or WaitLimit()
@@ -188,13 +188,13 @@ class GraspGenerator:
         rospy.loginfo_throttle(WAITING_PERIOD_S, f"{rospy.get_name()}: waiting, because {error}.")
         return False
 
-    def _on_demand(self, kept: Kept) -> TriggerResponse:
+    def _on_demand(self, kept: KeptGrasps) -> TriggerResponse:
         try:
             settings = read_settings()
             self._time.catch_up()
             with self._generating:
                 objects = self._objects(settings, kept)
-                if kept is not Kept.NONE and self._may_stay(objects, kept):
+                if kept is not KeptGrasps.NONE and self._may_stay(objects, kept):
                     names = sorted(target.name for target in objects)
                     return TriggerResponse(True, f"nothing has moved; the grasps of {names} stay")
                 return TriggerResponse(*self._signal_grasps(settings, objects))
@@ -202,12 +202,12 @@ class GraspGenerator:
             self._publish(False, str(error))
             return TriggerResponse(False, str(error))
 
-    def _may_stay(self, objects: list[SceneObject], kept: Kept) -> bool:
+    def _may_stay(self, objects: list[SceneObject], kept: KeptGrasps) -> bool:
         """Returns whether no object has moved and the manager still has the grasps that a request keeps."""
-        required_count = self._stored.count if kept is Kept.COMPLETE else 1
+        required_count = self._stored.count if kept is KeptGrasps.COMPLETE else 1
         return not self._generated.stale(objects) and self._stored.left() >= max(1, required_count)
 
-    def _objects(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
+    def _objects(self, settings: GeneratorSettings, kept: KeptGrasps) -> list[SceneObject]:
         """Returns the objects to grasp; waits until they are at rest, at most the timeout, except for `Kept.NONE`.
 
         For `Kept.COMPLETE`, the method also waits for an object.
@@ -215,7 +215,7 @@ class GraspGenerator:
         before: list[SceneObject] = []
         wait_limit = WaitLimit()
         while True:
-            late = kept is Kept.NONE or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s)
+            late = kept is KeptGrasps.NONE or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s)
             objects: list[SceneObject] = []
             try:
                 objects = self._scene.targets(settings)
@@ -223,10 +223,10 @@ class GraspGenerator:
                 try:
                     return self._seen(settings, error)
                 except NoObjectError:
-                    if late or kept is not Kept.COMPLETE:
+                    if late or kept is not KeptGrasps.COMPLETE:
                         raise
             if objects and (
-                late or at_rest(before, objects) or (kept is Kept.COMPLETE and self._may_stay(objects, kept))
+                late or at_rest(before, objects) or (kept is KeptGrasps.COMPLETE and self._may_stay(objects, kept))
             ):
                 return objects
             before = objects

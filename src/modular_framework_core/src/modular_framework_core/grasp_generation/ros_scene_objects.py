@@ -91,18 +91,18 @@ class SceneObjects:
         answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
         self.attached = {item.object.id for item in answer.scene.robot_state.attached_collision_objects}
         objects = []
-        known: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
+        known_objects: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
         for message in answer.scene.world.collision_objects:
             last_message, converted = self._known.get(message.id, (None, None))
             try:
                 if message != last_message:
                     converted = scene_object(message)
-                known[message.id] = message, converted
+                known_objects[message.id] = message, converted
             except (SceneObjectError, ValueError) as error:
                 rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is skipped.")
                 continue
             objects += [converted] if converted is not None else []
-        self._known = known
+        self._known = known_objects
         return objects
 
 

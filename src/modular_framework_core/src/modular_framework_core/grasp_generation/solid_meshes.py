@@ -13,29 +13,29 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
 
-SIDES = 64
+ROUND_SIDES = 64
 SPHERE_DIVISIONS = 3
 """Subdivisions of a sphere: 1,280 triangles, whose normals deviate by at most 4 degrees."""
 
 
 def box(size: Sequence[float]) -> TriangleMesh:
     """Returns a box around the origin with the lengths `size` along x, y, z [m]."""
-    return _scaled(_unit("box"), size)
+    return _scale_mesh(_unit("box"), size)
 
 
 def cylinder(height: float, radius: float) -> TriangleMesh:
     """Returns a cylinder along z around the origin [m], as an inscribed prism with 64 sides."""
-    return _scaled(_unit("cylinder"), (radius, radius, height))
+    return _scale_mesh(_unit("cylinder"), (radius, radius, height))
 
 
 def cone(height: float, radius: float) -> TriangleMesh:
     """Returns a cone along z with the tip up [m]; the origin is at half the height."""
-    return _scaled(_unit("cone"), (radius, radius, height))
+    return _scale_mesh(_unit("cone"), (radius, radius, height))
 
 
 def sphere(radius: float) -> TriangleMesh:
     """Returns a sphere around the origin [m]."""
-    return _scaled(_unit("sphere"), (radius, radius, radius))
+    return _scale_mesh(_unit("sphere"), (radius, radius, radius))
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
@@ -45,7 +45,7 @@ def outward(mesh: TriangleMesh) -> TriangleMesh:
     return mesh if volume >= 0.0 else TriangleMesh(mesh.vertices, mesh.triangles[:, ::-1])
 
 
-def moved(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMesh:
+def move_mesh(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMesh:
     """Returns a mesh after a rigid motion.
 
     Args:
@@ -56,7 +56,7 @@ def moved(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMe
     return TriangleMesh(mesh.vertices @ rotation.T + translation, mesh.triangles)
 
 
-def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+def join_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     """Concatenates meshes; overlapping solids are not merged."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return TriangleMesh(
@@ -65,7 +65,7 @@ def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def _scaled(mesh: TriangleMesh, factors: Sequence[float]) -> TriangleMesh:
+def _scale_mesh(mesh: TriangleMesh, factors: Sequence[float]) -> TriangleMesh:
     return TriangleMesh(mesh.vertices * np.array(factors, dtype=float), mesh.triangles)
 
 
@@ -76,12 +76,12 @@ def _unit(kind: str) -> TriangleMesh:
 
     match kind:
         case "box":
-            made = trimesh.creation.box((1.0, 1.0, 1.0))
+            mesh = trimesh.creation.box((1.0, 1.0, 1.0))
         case "cylinder":
-            made = trimesh.creation.cylinder(1.0, 1.0, sections=SIDES)
+            mesh = trimesh.creation.cylinder(1.0, 1.0, sections=ROUND_SIDES)
         case "cone":
-            made = trimesh.creation.cone(1.0, 1.0, sections=SIDES)
-            made.apply_translation([0.0, 0.0, -0.5])
+            mesh = trimesh.creation.cone(1.0, 1.0, sections=ROUND_SIDES)
+            mesh.apply_translation([0.0, 0.0, -0.5])
         case _:
-            made = trimesh.creation.icosphere(SPHERE_DIVISIONS, 1.0)
-    return TriangleMesh(np.asarray(made.vertices, dtype=np.float64), np.asarray(made.faces, dtype=np.int64))
+            mesh = trimesh.creation.icosphere(SPHERE_DIVISIONS, 1.0)
+    return TriangleMesh(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))

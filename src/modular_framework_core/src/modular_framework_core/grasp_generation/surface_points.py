@@ -34,7 +34,7 @@ class Surface:
     centroid: Array
     axes: Array
 
-    def moved(self, rotation: Array, translation: Array) -> Surface:
+    def transformed(self, rotation: Array, translation: Array) -> Surface:
         """Returns the surface after a rotation, shape (3, 3), and a translation, shape (3,) [m]."""
         return Surface(
             self.points @ rotation.T + translation,
@@ -45,7 +45,7 @@ class Surface:
         )
 
 
-def _steps(length: float) -> Array:
+def _edge_steps(length: float) -> Array:
     count = int(min(MAX_POINTS_PER_SIDE, max(2, math.ceil(length / SPACING_M) + 1)))
     return np.linspace(-length / 2, length / 2, count)
 
@@ -59,11 +59,11 @@ def box(size: Sequence[float]) -> Surface:
     lengths = [float(value) for value in size]
     points, normals = [], []
     for axis in range(3):
-        others = [other for other in range(3) if other != axis]
-        u, v = np.meshgrid(_steps(lengths[others[0]]), _steps(lengths[others[1]]))
+        other_axes = [other for other in range(3) if other != axis]
+        u, v = np.meshgrid(_edge_steps(lengths[other_axes[0]]), _edge_steps(lengths[other_axes[1]]))
         for sign in (-1.0, 1.0):
             face = np.zeros((u.size, 3))
-            face[:, others[0]], face[:, others[1]] = u.ravel(), v.ravel()
+            face[:, other_axes[0]], face[:, other_axes[1]] = u.ravel(), v.ravel()
             face[:, axis] = sign * lengths[axis] / 2
             normal = np.zeros((u.size, 3))
             normal[:, axis] = sign
@@ -83,7 +83,7 @@ def cylinder(height: float, radius: float, top_radius: float | None = None) -> S
     top = radius if top_radius is None else top_radius
     count = int(min(180, max(24, math.ceil(2 * math.pi * max(radius, top) / SPACING_M))))
     angles = np.linspace(0.0, 2 * math.pi, count, endpoint=False)
-    levels = _steps(height)
+    levels = _edge_steps(height)
     a, z = (grid.ravel() for grid in np.meshgrid(angles, levels))
     r = radius + (top - radius) * (z / height + 0.5)
     slope = (radius - top) / height
@@ -155,7 +155,7 @@ def mesh(vertices: Array, triangles: npt.NDArray[np.int64]) -> Surface:
     return Surface(stacked, np.vstack(normals), volume if closed else extent, centroid, axes)
 
 
-def joined(surfaces: Sequence[Surface]) -> Surface:
+def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
     """Joins the surfaces of the parts of one object."""
     volumes = np.array([surface.volume for surface in surfaces])
     centroid = (volumes[:, None] * np.array([surface.centroid for surface in surfaces])).sum(axis=0) / volumes.sum()

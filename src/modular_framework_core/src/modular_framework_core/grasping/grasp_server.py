@@ -83,7 +83,7 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
     """
     if not names:
         raise GraspCommandError("the posture has no joint names; give at least one joint with its position")
-    targets = _paired("the posture", names, "positions", positions, group)
+    targets = _values_by_joint("the posture", names, "positions", positions, group)
     for name, position in targets.items():
         joint = group.joint(name)
         if not math.isfinite(position) or not joint.lower - 1e-6 <= position <= joint.upper + 1e-6:
@@ -93,7 +93,9 @@ def posture_targets(names: Sequence[str], positions: Sequence[float], group: Gro
     return targets
 
 
-def _paired(label: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group) -> dict[str, float]:
+def _values_by_joint(
+    label: str, names: Sequence[str], kind: str, values: Sequence[float], group: Group
+) -> dict[str, float]:
     """Returns values by joint name; errors name the message part `label` and the kind of values."""
     if len(names) != len(values):
         raise GraspCommandError(
@@ -144,7 +146,7 @@ def torque_intensities(names: Sequence[str], values: Sequence[float], group: Gro
     """
     if not values:
         return {}
-    intensities = _paired("torque_intensity", names, "values", values, group)
+    intensities = _values_by_joint("torque_intensity", names, "values", values, group)
     for name, value in intensities.items():
         if not -1.0 <= value <= 1.0:
             raise GraspCommandError(f"the torque intensity of joint '{name}' is {value}; allowed: -1 to 1")

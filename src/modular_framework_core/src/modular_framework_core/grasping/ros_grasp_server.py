@@ -24,7 +24,7 @@ from modular_framework_core.grasping.grasp_server import (
     torque_share,
 )
 from modular_framework_core.grasping.ros_manipulator_drivers import ControlledManipulator, Manipulator, Motion
-from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidence
+from modular_framework_core.grasping.stall_evidence import CommandedMotion, StallEvidence
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.calls import CallError
@@ -118,7 +118,7 @@ class GraspServer:
             self._evidence = StallEvidence(self._tolerance)
         self._last_s = now_s
         start_state = self._manipulator.joint_state(targets)
-        attempt = Attempt(dict(zip(start_state.name, start_state.position, strict=True)), targets, efforts)
+        attempt = CommandedMotion(dict(zip(start_state.name, start_state.position, strict=True)), targets, efforts)
         outcome = self._evidence.judge(self._move(handle, motion), attempt)
         return stage, judge(stage, targets, outcome, closed_positions(self._group), self._tolerance)
 

@@ -149,7 +149,7 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
     Raises:
         GraspCommandError: No controller has all joints, or the controller type is unknown.
     """
-    known = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
+    joints_of_controller = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
     for entry in controllers:
         if set(joints) <= set(entry.get("joints", [])):
             action = "/".join(part for part in (str(entry.get("name", "")), str(entry.get("action_ns", ""))) if part)
@@ -163,7 +163,9 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
                         f"controller '{entry.get('name')}' has the type '{other}'; allowed: "
                         "GripperCommand, FollowJointTrajectory"
                     )
-    raise GraspCommandError(f"no controller has all joints {sorted(joints)}; controller_list has {known}")
+    raise GraspCommandError(
+        f"no controller has all joints {sorted(joints)}; controller_list has {joints_of_controller}"
+    )
 
 
 class Manipulator(Protocol):

@@ -14,7 +14,7 @@ MOVED_FRACTION = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
+class CommandedMotion:
     """Commanded motion of the fingers.
 
     Attributes:
@@ -49,7 +49,7 @@ class StallEvidence:
         self._held: Outcome | None = None
         self._moving_efforts: dict[tuple[str, float], float] = {}
 
-    def judge(self, outcome: Outcome, attempt: Attempt) -> Outcome:
+    def judge(self, outcome: Outcome, attempt: CommandedMotion) -> Outcome:
         """Rejects a stall that a lack of torque may have caused.
 
         A stall is accepted if the controller reports a pressing force, or if the fingers still hold the object of the
@@ -80,32 +80,32 @@ class StallEvidence:
         self._remember(outcome, attempt)
         return judged
 
-    def _still_holds(self, attempt: Attempt) -> bool:
+    def _still_holds(self, attempt: CommandedMotion) -> bool:
         held = self._held
         return held is not None and all(
             abs(held.positions.get(name, math.inf) - attempt.start_positions.get(name, math.inf)) <= self._tolerance
             for name in attempt.targets
         )
 
-    def _was_stopped(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
+    def _was_stopped(self, name: str, outcome: Outcome, attempt: CommandedMotion) -> bool:
         if (
             name not in attempt.start_positions
             or name not in outcome.positions
             or (abs(attempt.targets[name] - outcome.positions[name]) <= self._tolerance)
         ):
             return False
-        return self._moved(name, outcome, attempt) or attempt.effort(name) >= self._moving_efforts.get(
+        return self._has_moved(name, outcome, attempt) or attempt.effort(name) >= self._moving_efforts.get(
             (name, attempt.direction(name)), math.nan
         )
 
-    def _moved(self, name: str, outcome: Outcome, attempt: Attempt) -> bool:
+    def _has_moved(self, name: str, outcome: Outcome, attempt: CommandedMotion) -> bool:
         if name not in attempt.start_positions or name not in outcome.positions:
             return False
         distance = attempt.direction(name) * (outcome.positions[name] - attempt.start_positions[name])
         return distance > MOVED_FRACTION * self._tolerance
 
-    def _remember(self, outcome: Outcome, attempt: Attempt) -> None:
+    def _remember(self, outcome: Outcome, attempt: CommandedMotion) -> None:
         for name in attempt.targets:
-            if self._moved(name, outcome, attempt):
+            if self._has_moved(name, outcome, attempt):
                 key = (name, attempt.direction(name))
                 self._moving_efforts[key] = min(attempt.effort(name), self._moving_efforts.get(key, math.inf))

@@ -16,7 +16,7 @@ from modular_framework_core.launching.launch_values import value_faults
 from modular_framework_ros.allowed_names import nearest
 from modular_framework_urdf import xml_text
 
-BOOLEANS = ("true", "false", "1", "0")
+BOOLEAN_TEXTS = ("true", "false", "1", "0")
 """Texts that roslaunch accepts as a bool, case-insensitive."""
 
 
@@ -51,10 +51,10 @@ def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
 
 def known_arguments(path: str) -> dict[str, tuple[str, str | None]]:
     """Returns (documentation, default) of the arguments of a launch file and of files included with `pass_all_args`."""
-    known = dict(roslaunch.arg_dump.get_args([path]))
+    arguments = dict(roslaunch.arg_dump.get_args([path]))
     for included in _files_with_all_arguments(path):
-        known = known_arguments(included) | known
-    return known
+        arguments = known_arguments(included) | arguments
+    return arguments
 
 
 def _files_with_all_arguments(path: str) -> list[str]:
@@ -70,14 +70,14 @@ def _files_with_all_arguments(path: str) -> list[str]:
     ]
 
 
-def unknown_argument(name: str, known: Collection[str]) -> str:
+def unknown_argument(name: str, known_names: Collection[str]) -> str:
     """Returns the fault of an argument that the launch file does not have.
 
     Args:
         name: Name of the argument.
-        known: Names of the launch file's arguments.
+        known_names: Names of the launch file's arguments.
     """
-    return f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}"
+    return f"unknown argument '{name}'{nearest(name, known_names)}; allowed: {', '.join(sorted(known_names))}"
 
 
 def check_arguments(
@@ -93,22 +93,22 @@ def check_arguments(
     Raises:
         ArgumentError: Arguments are unknown or invalid; the message names all of them.
     """
-    known = known_arguments(path)
+    arguments_of_file = known_arguments(path)
     faults = []
     for argument in arguments:
         name, assignment, value = argument.partition(":=")
         if not assignment:
             start, sign, end = argument.partition("=")
-            hint = f"; did you mean '{start}:={end}'" if sign and start in known else ""
+            hint = f"; did you mean '{start}:={end}'" if sign and start in arguments_of_file else ""
             faults.append(f"argument '{argument}' is not of the form name:=value{hint}")
-        elif name not in known:
-            faults.append(unknown_argument(name, known))
+        elif name not in arguments_of_file:
+            faults.append(unknown_argument(name, arguments_of_file))
         elif ":=" in value:
             faults.append(
                 f"argument '{name}' is '{value}'; roslaunch does not support values with ':='; make it the default of "
                 "the argument in a launch file of your own that includes this file"
             )
-        elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
+        elif str(arguments_of_file[name][1]).lower() in BOOLEAN_TEXTS[:2] and value.lower() not in BOOLEAN_TEXTS:
             faults.append(f"argument '{name}' is '{value}'; it must be true or false")
     if not faults:
         faults = faults_of(argument_values(path, arguments))

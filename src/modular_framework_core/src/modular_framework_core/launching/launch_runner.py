@@ -27,7 +27,7 @@ from modular_framework_core.launching.launch_arguments import argument_values, c
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
-ENDINGS = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task could not be run"}
+ENDING_OF_EXIT_CODE = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task could not be run"}
 """Results by exit code of the task."""
 
 
@@ -196,13 +196,15 @@ def verdict(watcher: EndWatcher, cause: str) -> int:
     if watcher.task_exit_code is None:
         print("run_framework: stopped before the task ended", file=sys.stderr)
         return 1
-    result = ENDINGS.get(watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}")
+    result = ENDING_OF_EXIT_CODE.get(
+        watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}"
+    )
     failed = watcher.task_exit_code != 0
     print(f"run_framework: {result}{because if failed else ''}", file=sys.stderr if failed else sys.stdout, flush=True)
     return watcher.task_exit_code
 
 
-_RECORD = re.compile(r"^\[[\w.]+\]\[(\w+)\] [\d-]+ [\d:,]+: ")
+_LOG_RECORD = re.compile(r"^\[[\w.]+\]\[(\w+)\] [\d-]+ [\d:,]+: ")
 
 
 def cause_of_death(log_file: Path) -> str:
@@ -214,7 +216,7 @@ def cause_of_death(log_file: Path) -> str:
     message: list[str] = []
     in_fatal = False
     for line in lines:
-        record = _RECORD.match(line)
+        record = _LOG_RECORD.match(line)
         if record is not None:
             in_fatal = record[1] == "CRITICAL"
             if in_fatal:

@@ -24,20 +24,20 @@ STOP_TIMEOUT_S = 15.0
 KILL_POLL_S = 0.01
 """Polling period for remaining processes [s]."""
 
-PORTS = range(12000, 32000)
+PORT_RANGE = range(12000, 32000)
 """Ports of masters, below those that Linux assigns by default."""
 
 
 def free_port() -> int:
     """Returns a free TCP port of the loopback interface.
 
-    The operating system never assigns a port of `PORTS` to a node, so the port stays free until the master starts.
+    The operating system never assigns a port of `PORT_RANGE` to a node, so the port stays free until the master starts.
     """
-    for port in random.SystemRandom().sample(PORTS, len(PORTS)):
+    for port in random.SystemRandom().sample(PORT_RANGE, len(PORT_RANGE)):
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(("127.0.0.1", port))
             return port
-    raise OSError(f"all ports from {PORTS[0]} to {PORTS[-1]} are in use")
+    raise OSError(f"all ports from {PORT_RANGE[0]} to {PORT_RANGE[-1]} are in use")
 
 
 def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]:

@@ -21,7 +21,7 @@ from modular_framework_core.launching.launch_arguments import known_arguments, u
 from modular_framework_core.launching.launch_values import value_faults
 
 ROSLAUNCH = "roslaunch"
-NOTE = "Nothing was started. The error of roslaunch that follows only says that this check failed."
+FAILURE_NOTE = "Nothing was started. The error of roslaunch that follows only says that this check failed."
 
 
 def unknown_arguments(command: Sequence[str]) -> Iterator[str]:
@@ -37,13 +37,13 @@ def unknown_arguments(command: Sequence[str]) -> Iterator[str]:
     words = roslaunch._get_optparse().parse_args(list(command[programs.index(ROSLAUNCH) + 1 :]))[1]
     try:
         files = roslaunch.rlutil.resolve_launch_arguments(words)
-        known = {name for file in files for name in known_arguments(file)}
+        known_names = {name for file in files for name in known_arguments(file)}
     except roslaunch.core.RLException:
         return  # roslaunch reports the reason
     for word in words:
         name, sign, _ = word.partition(":=")
-        if sign and not name.startswith("_") and name not in known:
-            yield unknown_argument(name, known)
+        if sign and not name.startswith("_") and name not in known_names:
+            yield unknown_argument(name, known_names)
 
 
 def main(arguments: list[str]) -> int:
@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> int:
     for fault in faults:
         print(fault, file=sys.stderr)
     if faults:
-        print(NOTE, file=sys.stderr)
+        print(FAILURE_NOTE, file=sys.stderr)
     return 1 if faults else 0
 
 

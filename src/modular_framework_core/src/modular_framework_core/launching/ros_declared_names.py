@@ -19,7 +19,7 @@ from modular_framework_ros.parameter_declarations import (
 )
 
 ROSLAUNCH_NAMES = ("/rosdistro", "/rosversion", "/run_id", "/roslaunch")
-HARDWARE = ("modular_framework_control", "hardware")
+HARDWARE_PACKAGE_AND_NODE = ("modular_framework_control", "hardware")
 """Declaration of the common parameters of all hardware."""
 MAX_NAME_PARTS = 10
 """Maximum number of parts of a declared name."""
@@ -81,7 +81,10 @@ class DeclaredNames:
         for part, kind in (types or dict.fromkeys([node.name], *default) if default else types).items():
             package, _, name = str(kind).partition("/")
             declaration = node_declaration(package, name) if name else None
-            yield replace(node, name=part), declaration or replace(existing_declaration(*HARDWARE), closed=False)
+            yield (
+                replace(node, name=part),
+                declaration or replace(existing_declaration(*HARDWARE_PACKAGE_AND_NODE), closed=False),
+            )
 
     def _hardware_of(self, node: LaunchedNode, declared: NodeDeclaration | None) -> Iterator[str]:
         """Yields the namespace of each hardware of a node."""

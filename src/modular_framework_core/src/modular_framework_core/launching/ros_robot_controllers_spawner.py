@@ -165,7 +165,7 @@ class RobotControllersSpawner:
             rospy.Subscriber(topic, Bool, _set_when_true, ready[hardware]) for hardware, topic in topics.items()
         ]
 
-        def missing() -> str:
+        def missing_signals() -> str:
             return ", ".join(
                 f"True on topic {rospy.resolve_name(topics[name])} of hardware '{name}'"
                 for name, event in ready.items()
@@ -173,7 +173,7 @@ class RobotControllersSpawner:
             )
 
         subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics))
-        self._wait(lambda: not missing(), missing, "is the hardware connected and its driver running?")
+        self._wait(lambda: not missing_signals(), missing_signals, "is the hardware connected and its driver running?")
         for subscriber in subscribers:
             subscriber.unregister()
 

@@ -137,8 +137,10 @@ class AcmManager:
         name = object_id(entry_name)
         with self._lock:
             if name not in self._objects:
-                known = ", ".join(self._objects) or "none"
-                return f"'{name}' is not among the objects of the collision matrix ({known}); nothing was removed."
+                known_objects = ", ".join(self._objects) or "none"
+                return (
+                    f"'{name}' is not among the objects of the collision matrix ({known_objects}); nothing was removed."
+                )
             self._objects.remove(name)
             in_reference = self._initial is not None and name in self._initial.names
             if self._table is not None and name in self._table.names and not in_reference:
@@ -179,7 +181,7 @@ class AcmManager:
             selected_links = self._selected_links(links)
             for index, first in enumerate(selected_links):
                 for second in selected_links[index + 1 :]:
-                    table.set(first, second, allow or bool(initial.allowed(first, second)))
+                    table.set(first, second, allow or bool(initial.is_allowed(first, second)))
             return AcmResult(self._matrix(), _link_warnings(selected_links))
 
     def allow_object_collision(self, objects: Iterable[str], allow: bool, links: Sequence[str] = ()) -> AcmResult:
@@ -208,7 +210,7 @@ class AcmManager:
             for target in targets:
                 for link in selected_links:
                     if link != target:
-                        table.set(link, target, allow or bool(initial.allowed(link, target)))
+                        table.set(link, target, allow or bool(initial.is_allowed(link, target)))
             return AcmResult(self._matrix(), (*warnings, *_link_warnings(selected_links)))
 
     def permissions(self) -> frozenset[frozenset[str]]:

@@ -43,7 +43,7 @@ class CollisionMatrix:
                 f"{len(self.default_values)} default values."
             )
 
-    def allowed(self, first: str, second: str) -> bool | None:
+    def is_allowed(self, first: str, second: str) -> bool | None:
         """Returns whether a pair may touch, or None if the matrix does not contain both names."""
         if first not in self.names or second not in self.names:
             return None

@@ -111,7 +111,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
             not match the type. The message names all of them.
     """
     try:
-        content = parsed(read_text(path))
+        content = parse_text(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
@@ -123,9 +123,11 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
     if not isinstance(mapping, dict) or not isinstance(items, list):
         raise MessageFileError(f"{path}: 'named' must be a mapping of names to messages and 'anonymous' a list")
     faults = [f"{path}: {fault}" for name in mapping if (fault := name_fault(str(name)))]
-    named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in mapping.items()}
+    named = {
+        str(name): _fill_message(message_type, value, f"{path}: '{name}'", faults) for name, value in mapping.items()
+    }
     anonymous = [
-        _filled(message_type, value, f"{path}: anonymous message {index}", faults)
+        _fill_message(message_type, value, f"{path}: anonymous message {index}", faults)
         for index, value in enumerate(items, start=1)
     ]
     if faults:
@@ -142,7 +144,7 @@ _YamlLoader.add_implicit_resolver(
 )
 
 
-def parsed(text: str) -> Any:
+def parse_text(text: str) -> Any:
     """Returns the content of a JSON or YAML text."""
     for parse in (orjson.loads, json.loads):  # only the slower json reads NaN and Infinity
         try:
@@ -156,13 +158,13 @@ def parsed(text: str) -> Any:
 
 def flow_text(message: Any) -> str:
     """Returns a message as one line of JSON."""
-    text = orjson.dumps(message, default=_plain).decode()
+    text = orjson.dumps(message, default=_plain_value).decode()
     if "null" in text:  # orjson writes null for non-finite numbers; the slower json writes their names
-        return json.dumps(message, default=_plain)
+        return json.dumps(message, default=_plain_value)
     return text
 
 
-def _plain(value: Any) -> Any:
+def _plain_value(value: Any) -> Any:
     """Converts a value that JSON does not support."""
     match value:
         case genpy.Message():
@@ -175,11 +177,11 @@ def _plain(value: Any) -> Any:
             return value.tolist()  # NumPy's numbers and arrays
 
 
-def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any:
+def _fill_message(message_type: Any, value: Any, where: str, faults: list[str]) -> Any:
     message = message_type()
     try:
         try:
-            message = _built(message_type, value)
+            message = _build_value(message_type, value)
         except (LookupError, TypeError):  # messages written by hand may omit fields
             genpy.message.fill_message_args(message, [value])
         message.serialize(io.BytesIO())
@@ -188,7 +190,7 @@ def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any
     return message
 
 
-def _built(message_type: Any, value: Any) -> Any:
+def _build_value(message_type: Any, value: Any) -> Any:
     """Returns a message read from the output of ``save``, ten times as fast as genpy.
 
     Raises:
@@ -203,7 +205,7 @@ def _built(message_type: Any, value: Any) -> Any:
         if is_list and type(content) is not list:
             raise TypeError(f"{name} is not a list")
         if part is not None:
-            content = [_built(part, item) for item in content] if is_list else _built(part, content)
+            content = [_build_value(part, item) for item in content] if is_list else _build_value(part, content)
         setattr(message, name, content)
     return message
 

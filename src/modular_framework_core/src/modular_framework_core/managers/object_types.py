@@ -72,6 +72,6 @@ class ObjectTypes:
 
     def _checked_name(self, object_name: str) -> str:
         if object_name not in self._types:
-            known = ", ".join(sorted(self._types)) or "none"
-            raise ObjectTypeError(f"No object named '{object_name}' is registered. Registered: {known}.")
+            known_names = ", ".join(sorted(self._types)) or "none"
+            raise ObjectTypeError(f"No object named '{object_name}' is registered. Registered: {known_names}.")
         return object_name

@@ -188,7 +188,7 @@ class AcmServices(ManagerServices):
     def _modify_links(self, request: Any) -> ModifyACMResponse:
         self._remove_deleted_objects()
         try:
-            result = self._modified(request)
+            result = self._modify_matrix(request)
             if request.publish:
                 apply_matrix(matrix_to_message(result.matrix), APPLY_TIMEOUT_S)
         except (AcmError, CallError) as error:
@@ -198,7 +198,7 @@ class AcmServices(ManagerServices):
             rospy.logwarn("modify_acm: %s", warning)
         return ModifyACMResponse(success=True)
 
-    def _modified(self, request: Any) -> AcmResult:
+    def _modify_matrix(self, request: Any) -> AcmResult:
         match request.modification:
             case ModifyACMRequest.ROBOT_SELF_COLLISION:
                 return self.manager.allow_self_collision(request.allow_collision, request.robot_links)

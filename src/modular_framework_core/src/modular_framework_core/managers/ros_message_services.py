@@ -209,7 +209,7 @@ class MessageServices(ManagerServices):
             path = message_files.path_of(request.path, self._folder)
             count = message_files.save(path, self.kind.noun, *self.store.contents())
         except message_files.MessageFileError as error:
-            return self._refused(str(error))
+            return self._refuse_request(str(error))
         return srv.MessageFileResponse(success=True, message=str(path), count=count)
 
     def _load(self, request: Any) -> Any:
@@ -217,7 +217,7 @@ class MessageServices(ManagerServices):
             path = message_files.path_of(request.path, self._folder)
             named, anonymous = message_files.load(path, self.kind.noun, self.kind.message_type)
         except message_files.MessageFileError as error:
-            return self._refused(str(error))
+            return self._refuse_request(str(error))
         messages = [
             *((f"'{name}'", item) for name, item in named.items()),
             *((f"anonymous message {index}", item) for index, item in enumerate(anonymous, start=1)),
@@ -228,14 +228,14 @@ class MessageServices(ManagerServices):
             if (fault := position_fault(item))
         ]
         if faults:
-            return self._refused("\n".join(faults))
+            return self._refuse_request("\n".join(faults))
         self.store.load(named, anonymous)
         return srv.MessageFileResponse(success=True, message=str(path), count=len(named) + len(anonymous))
 
     def _reload(self, request: Any) -> Any:
         if self._file is None:
             if request.path:
-                return self._refused(
+                return self._refuse_request(
                     f"no file of named messages is configured for the kind '{self.kind.noun}'; "
                     f"use load_{self.kind.plural} to read a saved file"
                 )
@@ -247,10 +247,10 @@ class MessageServices(ManagerServices):
                 path = message_files.path_of(request.path, self._folder, (file.path.parent,))
                 file = NamedFile(path, file.read)
         except message_files.MessageFileError as error:
-            return self._refused(str(error))
+            return self._refuse_request(str(error))
         count, faults = self._read(file)
         if faults:
-            return self._refused("\n".join(map(str, faults)), count)
+            return self._refuse_request("\n".join(map(str, faults)), count)
         return srv.MessageFileResponse(success=True, message=str(file.path), count=count)
 
     def _reinitialise(self, request: Any) -> Any:
@@ -268,6 +268,6 @@ class MessageServices(ManagerServices):
         )
         return len(named), faults
 
-    def _refused(self, reason: str, count: int = 0) -> Any:
+    def _refuse_request(self, reason: str, count: int = 0) -> Any:
         rospy.logerr("%s", reason)
         return srv.MessageFileResponse(success=False, message=reason, count=count)

@@ -57,8 +57,8 @@ def run_message_manager(kind: MessageKind, node_name: str) -> None:
     readers = {kinds.JOINT_STATE: read_joint_states, kinds.POSE: read_poses, kinds.ROBOT_POSE: read_robot_poses}
     if kind is kinds.TRAJECTORY and arguments:
         readers[kind] = trajectory_reader(lookup_over_service(start_timeout()))
-    named = NamedFile(Path(arguments[0]), readers[kind]) if arguments and kind in readers else None
-    MessageServices(kind, named).connect()
+    named_file = NamedFile(Path(arguments[0]), readers[kind]) if arguments and kind in readers else None
+    MessageServices(kind, named_file).connect()
     rospy.spin()
 
 
@@ -88,18 +88,18 @@ def run_all() -> None:
     parameters = read("~named_joint_states_file", "~named_trajectories_file", "~named_poses_file")
     files = [path or argument for path, argument in zip(parameters, arguments, strict=False)]
 
-    def named(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
+    def named_file(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
         return NamedFile(Path(path), read) if path else None
 
     if files[2] and not Path(files[2]).exists():
         rospy.loginfo("There is no file of named poses: %s", files[2])
         files[2] = ""
-    joint_states = MessageServices(kinds.JOINT_STATE, named(files[0], read_joint_states))
+    joint_states = MessageServices(kinds.JOINT_STATE, named_file(files[0], read_joint_states))
     services = [
         joint_states,
-        MessageServices(kinds.TRAJECTORY, named(files[1], trajectory_reader(joint_lookup(joint_states)))),
-        MessageServices(kinds.POSE, named(files[2], read_poses)),
-        MessageServices(kinds.ROBOT_POSE, named(files[2], read_robot_poses)),
+        MessageServices(kinds.TRAJECTORY, named_file(files[1], trajectory_reader(joint_lookup(joint_states)))),
+        MessageServices(kinds.POSE, named_file(files[2], read_poses)),
+        MessageServices(kinds.ROBOT_POSE, named_file(files[2], read_robot_poses)),
         MessageServices(kinds.PLAN),
         MessageServices(kinds.GRASP),
     ]

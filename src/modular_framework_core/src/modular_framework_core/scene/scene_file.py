@@ -13,7 +13,7 @@ from pathlib import Path
 
 from modular_framework_urdf.rotations import multiply_quaternions, rotate_vector
 
-SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2, "plane": 4}
+SIZE_COUNT_OF_SHAPE = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2, "plane": 4}
 """Number of size parameters: box sides; sphere radius; cylinder and cone radius and length [m]; plane a, b, c, d."""
 
 Vector = tuple[float, ...]
@@ -30,7 +30,7 @@ class SceneShape:
 
     Attributes:
         kind: box, sphere, cylinder, cone, plane or mesh.
-        size: Size parameters, see ``SIZES``; empty for a mesh.
+        size: Size parameters, see ``SIZE_COUNT_OF_SHAPE``; empty for a mesh.
         position: Position x, y, z in the object frame [m].
         quaternion_xyzw: Orientation in the object frame.
         vertices: Mesh vertices x, y, z [m].
@@ -80,7 +80,7 @@ class Scene:
     objects: tuple[SceneObject, ...]
 
 
-class _Lines:
+class _LineReader:
     """Nonempty lines of a file with their line numbers."""
 
     def __init__(self, path: Path, text: str) -> None:
@@ -133,7 +133,7 @@ def read_scene_file(path: Path) -> Scene:
         SceneFileError: The file cannot be read or is not a text scene.
     """
     try:
-        lines = _Lines(path, path.read_text(encoding="utf-8"))
+        lines = _LineReader(path, path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         scene_names = ", ".join(sorted(file.name for file in path.parent.glob("*.scene"))) or "none"
         raise SceneFileError(f"{path}: cannot be read ({error}); scenes in its folder: {scene_names}") from error
@@ -149,7 +149,7 @@ def read_scene_file(path: Path) -> Scene:
     return Scene(name, tuple(objects))
 
 
-def _read_object(name: str, lines: _Lines) -> SceneObject:
+def _read_object(name: str, lines: _LineReader) -> SceneObject:
     position: Vector = (0.0, 0.0, 0.0)
     quaternion: Vector = (0.0, 0.0, 0.0, 1.0)
     has_pose = len(lines.peek().split()) > 1
@@ -172,7 +172,7 @@ def _read_object(name: str, lines: _Lines) -> SceneObject:
     return SceneObject(name, position, quaternion, shapes, tuple(subframes))
 
 
-def _read_shape(lines: _Lines) -> SceneShape:
+def _read_shape(lines: _LineReader) -> SceneShape:
     kind = lines.next_line("the kind of a shape")
     vertices: tuple[Vector, ...] = ()
     triangles: tuple[tuple[int, ...], ...] = ()
@@ -181,12 +181,12 @@ def _read_shape(lines: _Lines) -> SceneShape:
         vertex_count, triangle_count = lines.counts(2, "the numbers of vertices and triangles")
         vertices = tuple(lines.numbers(3, "a vertex") for _ in range(vertex_count))
         triangles = tuple(_triangle(lines, vertex_count) for _ in range(triangle_count))
-    elif kind in SIZES:
-        size = lines.numbers(SIZES[kind], f"the size of a {kind}")
+    elif kind in SIZE_COUNT_OF_SHAPE:
+        size = lines.numbers(SIZE_COUNT_OF_SHAPE[kind], f"the size of a {kind}")
         if kind != "plane" and min(size) <= 0.0:
             raise lines.fault(f"the size of a {kind}, greater than 0")
     else:
-        raise lines.fault(f"a kind of shape: {', '.join((*SIZES, 'mesh'))}")
+        raise lines.fault(f"a kind of shape: {', '.join((*SIZE_COUNT_OF_SHAPE, 'mesh'))}")
     position = lines.numbers(3, f"the position of a {kind}")
     quaternion = lines.quaternion(f"the orientation of a {kind}")
     color = lines.numbers(4, f"the colour of a {kind}")
@@ -195,7 +195,7 @@ def _read_shape(lines: _Lines) -> SceneShape:
     return SceneShape(kind, size, position, quaternion, vertices=vertices, triangles=triangles, color=color)
 
 
-def _triangle(lines: _Lines, vertex_count: int) -> tuple[int, ...]:
+def _triangle(lines: _LineReader, vertex_count: int) -> tuple[int, ...]:
     indices = lines.counts(3, "a triangle")
     if max(indices) >= vertex_count:
         raise lines.fault(f"a triangle of indices below {vertex_count}")

@@ -32,8 +32,8 @@ KEY_MEANINGS = {
     "io_keys": "Userdata keys that the state reads and writes.",
 }
 
-_REGISTERS = {f"register_{key}": key for key in STATE_KEYS}
-_COPIES = ("list", "tuple")
+_KEY_OF_REGISTER_METHOD = {f"register_{key}": key for key in STATE_KEYS}
+_COPYING_FUNCTIONS = ("list", "tuple")
 
 Names = tuple[str, ...] | None
 
@@ -67,7 +67,7 @@ def own_keys(constructor: ast.FunctionDef, has_smach_base: bool, aliases: Mappin
                 fixed[key] = _names(base_arguments[key], aliases)
             elif key not in base_arguments and (rest_unknown or key in options):
                 fixed[key] = None
-    return fixed | dict.fromkeys(_changed(constructor))
+    return fixed | dict.fromkeys(_changed_keys(constructor))
 
 
 def keys_argument(constructor: ast.FunctionDef) -> str | None:
@@ -96,7 +96,7 @@ def _is_option(value: ast.expr, key: str) -> bool:
     match value:
         case ast.Name(id=name):
             return name == key
-        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id=inner)]) if name in _COPIES:
+        case ast.Call(func=ast.Name(id=name), args=[ast.Name(id=inner)]) if name in _COPYING_FUNCTIONS:
             return inner == key
     return False
 
@@ -110,7 +110,7 @@ def _names(value: ast.expr, aliases: Mapping[str, ast.expr]) -> Names:
     return tuple(plain) if is_list else None
 
 
-def _changed(constructor: ast.FunctionDef) -> Iterator[str]:
+def _changed_keys(constructor: ast.FunctionDef) -> Iterator[str]:
     """Yields the keys whose option the constructor changes, or to which the constructor adds names."""
     for item in ast.walk(constructor):
         match item:
@@ -118,5 +118,5 @@ def _changed(constructor: ast.FunctionDef) -> Iterator[str]:
                 yield name
             case ast.Attribute(value=ast.Name(id=name)) if name in STATE_KEYS:
                 yield name
-            case ast.Attribute(attr=name) if name in _REGISTERS:
-                yield _REGISTERS[name]
+            case ast.Attribute(attr=name) if name in _KEY_OF_REGISTER_METHOD:
+                yield _KEY_OF_REGISTER_METHOD[name]

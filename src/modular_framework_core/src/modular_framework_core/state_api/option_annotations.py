@@ -13,19 +13,19 @@ from typing import Any
 
 from modular_framework_core.state_api.option_limits import Length, Limits
 from modular_framework_core.state_api.option_types import (
-    PLAIN,
+    SCALAR_TYPES,
     AnyOf,
     Anything,
     Choice,
     ListOf,
     MappingOf,
     OptionType,
-    Plain,
+    ScalarType,
 )
 from modular_framework_core.state_api.option_uses import KINDS, Use
 
-_LISTS = ("list", "List", "Sequence", "Iterable", "Collection", "tuple", "Tuple", "set", "frozenset")
-_MAPPINGS = ("dict", "Dict", "Mapping")
+_LIST_TYPES = ("list", "List", "Sequence", "Iterable", "Collection", "tuple", "Tuple", "set", "frozenset")
+_MAPPING_TYPES = ("dict", "Dict", "Mapping")
 
 
 def from_annotation(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> OptionType:
@@ -85,14 +85,14 @@ class _Reader:
     def read(self, node: ast.expr | None) -> OptionType:
         match node:
             case ast.Constant(value=None) | ast.Name(id="NoneType"):
-                return Plain("None")
+                return ScalarType("None")
             case ast.Constant(value=str(text)):
                 return self._text(text)
-            case ast.Name(id=name) if name in PLAIN:
-                return Plain(name)
-            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _LISTS:
+            case ast.Name(id=name) if name in SCALAR_TYPES:
+                return ScalarType(name)
+            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _LIST_TYPES:
                 return ListOf(Anything())
-            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _MAPPINGS:
+            case ast.Name(id=name) | ast.Attribute(attr=name) if name in _MAPPING_TYPES:
                 return MappingOf(Anything())
             case ast.Name(id=name) if name in self._aliases and name not in self._aliases_in_progress:
                 return self._alias(name)
@@ -120,16 +120,16 @@ class _Reader:
             values = [item.value for item in inner if isinstance(item, ast.Constant)]
             return Choice(tuple(values)) if len(values) == len(inner) else Anything()
         if name == "Annotated":
-            return functools.reduce(_limited, map(self._limit_in, inner[1:]), self.read(inner[0]))
+            return functools.reduce(_limited_type, map(self._limit_in, inner[1:]), self.read(inner[0]))
         if name == "Optional":
             return self._any_of([*inner, ast.Constant(value=None)])
         if name == "Union":
             return self._any_of(inner)
-        if name in _LISTS:
+        if name in _LIST_TYPES:
             items = [item for item in inner if not (isinstance(item, ast.Constant) and item.value is ...)]
             read = {self.read(item) for item in items}
             return ListOf(read.pop() if len(read) == 1 else AnyOf(tuple(sorted(read, key=repr))))
-        if name in _MAPPINGS:
+        if name in _MAPPING_TYPES:
             return MappingOf(self.read(inner[-1]))
         return Anything()
 
@@ -164,11 +164,11 @@ class _Reader:
         return _value(node, self._aliases)
 
 
-def _limited(kind: OptionType, limit: Limits | Length | None) -> OptionType:
+def _limited_type(kind: OptionType, limit: Limits | Length | None) -> OptionType:
     match kind, limit:
         case AnyOf(types=types), _:
-            return AnyOf(tuple(_limited(item, limit) for item in types))
-        case Plain(kind="float" | "int", limits=limits), Limits():
+            return AnyOf(tuple(_limited_type(item, limit) for item in types))
+        case ScalarType(kind="float" | "int", limits=limits), Limits():
             return replace(kind, limits=Limits(**({} if limits is None else limits.bounds()) | limit.bounds()))
         case ListOf(), Length():
             return replace(kind, length=limit)

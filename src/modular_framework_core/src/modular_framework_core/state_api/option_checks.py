@@ -17,7 +17,7 @@ from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Seq
 from modular_framework_core.state_api.option_annotations import from_hint
 from modular_framework_core.state_api.option_types import Anything, OptionType, option_fault
 
-_HERE = SourceLocation("", 0, 0)
+_NO_LOCATION = SourceLocation("", 0, 0)
 
 
 class _NoTaskValueError(Exception):
@@ -70,12 +70,12 @@ def declared_types(constructor: Callable[..., None]) -> dict[str, OptionType]:
     hints = getattr(original, "__annotations__", {})
     types: dict[str, Any] = {}
     for name, hint in hints.items():
-        evaluated = _evaluated(hint, getattr(original, "__globals__", {}))
+        evaluated = _evaluate_hint(hint, getattr(original, "__globals__", {}))
         types |= get_type_hints(get_args(evaluated)[0]) if get_origin(evaluated) is Unpack else {name: evaluated}
     return {name: from_hint(hint) for name, hint in types.items()}
 
 
-def _evaluated(hint: Any, names: dict[str, Any]) -> Any:
+def _evaluate_hint(hint: Any, names: dict[str, Any]) -> Any:
     annotated = SimpleNamespace(__annotations__={"hint": hint})
     try:
         return get_type_hints(annotated, names, include_extras=True)["hint"]
@@ -97,11 +97,11 @@ def _node(value: Any) -> Node:
     """Returns a value as the YAML tree of a task file."""
     match value:
         case None | bool() | str() | int() | float():
-            return Scalar(value, _HERE)
+            return Scalar(value, _NO_LOCATION)
         case MappingABC():
-            return Mapping({str(key): _node(item) for key, item in value.items()}, {}, _HERE)
+            return Mapping({str(key): _node(item) for key, item in value.items()}, {}, _NO_LOCATION)
         case list() | tuple() | set() | frozenset():
-            return Sequence(tuple(map(_node, value)), _HERE)
+            return Sequence(tuple(map(_node, value)), _NO_LOCATION)
         case np.ndarray() | np.generic():
             return _node(value.tolist())
     raise _NoTaskValueError

@@ -29,7 +29,7 @@ class Anything:
 
 
 @dataclass(frozen=True, slots=True)
-class Plain:
+class ScalarType:
     """Text, number, integer, bool or null; numbers may have limits."""
 
     kind: str
@@ -37,7 +37,7 @@ class Plain:
 
     def describe(self) -> str:
         """See ``Anything.describe``."""
-        what = PLAIN[self.kind][0]
+        what = SCALAR_TYPES[self.kind][0]
         return what if self.limits is None else self.limits.describe(what)
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
@@ -45,7 +45,7 @@ class Plain:
         if not isinstance(node, Scalar):
             return node, self
         value = node.value
-        fits = self.kind == "bool" if isinstance(value, bool) else isinstance(value, PLAIN[self.kind][1])
+        fits = self.kind == "bool" if isinstance(value, bool) else isinstance(value, SCALAR_TYPES[self.kind][1])
         return None if fits and not self.remedy(value) else (node, self)
 
     def remedy(self, value: Any) -> str:
@@ -55,10 +55,10 @@ class Plain:
 
     def schema(self) -> dict[str, Any]:
         """See ``Anything.schema``."""
-        return {"type": PLAIN[self.kind][2]} | ({} if self.limits is None else self.limits.schema())
+        return {"type": SCALAR_TYPES[self.kind][2]} | ({} if self.limits is None else self.limits.schema())
 
 
-PLAIN: dict[str, tuple[str, Any, str]] = {
+SCALAR_TYPES: dict[str, tuple[str, Any, str]] = {
     "str": ("a text", str, "string"),
     "float": ("a number", (int, float), "number"),
     "int": ("a whole number", int, "integer"),
@@ -159,7 +159,7 @@ class AnyOf:
         return {"anyOf": [item.schema() for item in self.types]}
 
 
-OptionType = Union[Anything, Plain, Choice, ListOf, MappingOf, AnyOf]  # noqa: UP007 - the classes refer to it by name
+OptionType = Union[Anything, ScalarType, Choice, ListOf, MappingOf, AnyOf]  # noqa: UP007 - the classes refer to it by name
 
 
 def or_reference(schema: dict[str, Any]) -> dict[str, Any]:
@@ -182,24 +182,24 @@ def option_fault(allowed: OptionType, node: Node) -> tuple[Node, str] | None:
         return None
     node, required = mismatch
     parts = required.types if isinstance(required, AnyOf) else (required,)
-    found = kind_of(node)
+    found_text = kind_of(node)
     if isinstance(node, Sequence) and any(isinstance(part, ListOf) and part.length for part in parts):
-        found = f"a list of {len(node.items)}"
+        found_text = f"a list of {len(node.items)}"
     hint = _remedy(node, parts) if isinstance(node, Scalar) else ""
-    return node, f"must be {required.describe()}, found {found}{hint}"
+    return node, f"must be {required.describe()}, found {found_text}{hint}"
 
 
 def _remedy(node: Scalar, parts: tuple[OptionType, ...]) -> str:
     value = node.value
     for part in parts:
-        if isinstance(part, Plain) and (remedy := part.remedy(value)):
+        if isinstance(part, ScalarType) and (remedy := part.remedy(value)):
             return f"; {remedy}"
     if isinstance(value, str):
-        if len(parts) == 1 and isinstance(parts[0], Plain) and parts[0].kind in ("float", "int"):
+        if len(parts) == 1 and isinstance(parts[0], ScalarType) and parts[0].kind in ("float", "int"):
             return "; remove the quotes to make it a number" if _is_quoted_number(value) else ""
         names = [item for part in parts if isinstance(part, Choice) for item in part.values if isinstance(item, str)]
         return nearest(value, names)
-    return "; put it in quotes to make it text" if parts == (Plain("str"),) and value is not None else ""
+    return "; put it in quotes to make it text" if parts == (ScalarType("str"),) and value is not None else ""
 
 
 def _is_quoted_number(value: str) -> bool:

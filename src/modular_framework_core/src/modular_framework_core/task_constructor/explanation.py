@@ -46,7 +46,7 @@ def explain_template(template: TemplateSource) -> str:
         "Keys of the task, or of a nested machine:",
     ]
     for key in machine_keys(template):
-        lines += [f"  {key.name}: {key.form}, {_use(key)}", *_indented(key.meaning)]
+        lines += [f"  {key.name}: {key.form}, {_use_text(key)}", *_indented_lines(key.meaning)]
     userdata = "unknown" if template.userdata is None else ", ".join(sorted(template.userdata))
     lines += ["", *textwrap.wrap(f"Userdata provided: {userdata or 'none'}", _WIDTH, subsequent_indent="  ")]
     return "\n".join(lines)
@@ -73,22 +73,22 @@ def option_meanings(doc: str) -> dict[str, str]:
 
 
 def _option(option: StateOption, meaning: str) -> list[str]:
-    text = f"  {option.name}: {option.type.describe()}, {_default(option)}"
-    return [text, *_indented(meaning)]
+    text = f"  {option.name}: {option.type.describe()}, {_default_text(option)}"
+    return [text, *_indented_lines(meaning)]
 
 
-def _indented(meaning: str) -> list[str]:
+def _indented_lines(meaning: str) -> list[str]:
     return textwrap.wrap(meaning, _WIDTH, initial_indent="      ", subsequent_indent="      ")
 
 
-def _use(key: MachineKey) -> str:
+def _use_text(key: MachineKey) -> str:
     if key.at_root and key.nested:
         same = key.at_root == key.nested
         return key.at_root if same else f"{key.at_root} in a task, {key.nested} in a nested machine"
     return f"{key.at_root}, in a task only" if key.at_root else f"{key.nested}, in a nested machine only"
 
 
-def _default(option: StateOption) -> str:
+def _default_text(option: StateOption) -> str:
     if option.required:
         return "required"
     try:

@@ -115,7 +115,7 @@ def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept"
     )
     environment.filters["literal"] = literal
     machines = list(task.root.machines())
-    compiled = {file: _compiled(environment, file) for file in {machine.template.file for machine in machines}}
+    compiled = {file: _compile_template(environment, file) for file in {machine.template.file for machine in machines}}
     sections = [_section(compiled[machine.template.file], machine, task) for machine in machines]
     text = "\n\n".join([_header(task, digest), *sections, _footer(task)])
     try:
@@ -165,7 +165,7 @@ def write(task: TaskSpec, text: str, directory: Path, file_name: str = "") -> Pa
     return target
 
 
-def _compiled(environment: jinja2.Environment, file: Path) -> jinja2.Template:
+def _compile_template(environment: jinja2.Environment, file: Path) -> jinja2.Template:
     try:
         return environment.from_string(file.read_text(encoding="utf-8"))
     except jinja2.TemplateSyntaxError as error:

@@ -30,22 +30,22 @@ def value_of(node: Mapping, key: str) -> Node | None:
     return next((value for written, value in node.entries.items() if intended_key(written, [key])), None)
 
 
-def corrected_keys(node: Mapping, known: Collection[str], noun: str, faults: FaultList) -> Mapping:
+def corrected_keys(node: Mapping, known_keys: Collection[str], noun: str, faults: FaultList) -> Mapping:
     """Returns a mapping with known keys only: misspelt keys are corrected, other unknown keys are dropped.
 
     Args:
         node: Mapping as written.
-        known: Allowed keys.
+        known_keys: Allowed keys.
         noun: Noun phrase for a key, for messages.
         faults: Receives a fault for each unknown key.
     """
-    entries = {key: value for key, value in node.entries.items() if key in known}
+    entries = {key: value for key, value in node.entries.items() if key in known_keys}
     keys = {key: node.keys[key] for key in entries}
     for key, value in node.entries.items():
-        if key in known:
+        if key in known_keys:
             continue
-        faults.add_unknown(node.keys[key], noun, key, known, used=entries)
-        intended = intended_key(key, [name for name in known if name not in entries])
+        faults.add_unknown(node.keys[key], noun, key, known_keys, used=entries)
+        intended = intended_key(key, [name for name in known_keys if name not in entries])
         if intended is not None:
             entries[intended], keys[intended] = value, node.keys[key]
             faults.harmless += 1

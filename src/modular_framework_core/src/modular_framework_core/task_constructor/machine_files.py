@@ -62,14 +62,14 @@ def with_machine_file(label: str, body: Mapping, file: Path, faults: FaultList) 
     entries, keys = dict(root.entries), dict(root.keys)
     for key in own:
         if key == "params":
-            entries[key] = _merged(root.entries.get(key), own.entries[key])
+            entries[key] = _merge_params(root.entries.get(key), own.entries[key])
         elif key != "source":
             entries[key] = own.entries[key]
         keys.setdefault(key, own.keys[key])
     return Mapping(entries, keys, root.location)
 
 
-def _merged(defaults: Node | None, params: Node) -> Node:
+def _merge_params(defaults: Node | None, params: Node) -> Node:
     if not isinstance(defaults, Mapping) or not isinstance(params, Mapping):
         return params
     return Mapping({**defaults.entries, **params.entries}, {**defaults.keys, **params.keys}, params.location)
@@ -84,17 +84,17 @@ def machine_files(script: Path) -> tuple[Path, ...]:
     Args:
         script: Path of the task.
     """
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     pending = [script]
     while pending:
         try:
             root = located_yaml.load(pending.pop(), FaultList())
         except TaskFault:
             continue
-        new = [file for body in _mappings(root) if (file := machine_file(body)) is not None and file not in found]
-        found |= dict.fromkeys(new)
+        new = [file for body in _mappings(root) if (file := machine_file(body)) is not None and file not in files]
+        files |= dict.fromkeys(new)
         pending += new
-    return tuple(found)
+    return tuple(files)
 
 
 def _mappings(node: Node) -> Iterator[Mapping]:

@@ -79,8 +79,8 @@ class _Checker:
         self._unchecked_kinds = unchecked_kinds
         self._possibly_stored = possibly_stored
         self._faults = faults
-        self._inputs = _declared(state, ("input_keys", "io_keys"))
-        self._outputs = _declared(state, ("output_keys", "io_keys"))
+        self._inputs = _declared_key_union(state, ("input_keys", "io_keys"))
+        self._outputs = _declared_key_union(state, ("output_keys", "io_keys"))
 
     def check(self) -> None:
         """Adds all faults of the state."""
@@ -103,13 +103,13 @@ class _Checker:
                 if not value or (when and value not in (when, [when])):
                     return
                 userdata_key = str(value) if not key else key.format(kind_of(str(value)))
-                self._need(direction, userdata_key, f"option '{name}' {value!r}", location)
+                self._require_key(direction, userdata_key, f"option '{name}' {value!r}", location)
             case Fields() if node is not None:
                 for location, text in _references(node):
-                    self._need("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", location)
+                    self._require_key("input", text.removeprefix(USERDATA_PREFIX).split(".")[0], f"'{text}'", location)
             case OutputKeys() if isinstance(node, Mapping):
                 for key in node:
-                    self._need("output", key, f"option '{name}'", node.keys[key])
+                    self._require_key("output", key, f"option '{name}'", node.keys[key])
             case OutcomeNames() if isinstance(node, Mapping) and self._state.outcomes:
                 for key in node:
                     if key not in self._state.outcomes:
@@ -126,7 +126,7 @@ class _Checker:
             if use.userdata and name == FROM_USERDATA:
                 keys = tuple(dict.fromkeys((f"selected_{kind_word}", f"selected_{kind}")))
                 if self._inputs is not None and not self._inputs.intersection(keys):
-                    self._need("input", keys[-1], f"option '{option}' 'userdata'", item.location)
+                    self._require_key("input", keys[-1], f"option '{option}' 'userdata'", item.location)
                 continue
             names = None if kind in self._unchecked_kinds else self._known.of_kind(kind)
             may_be_stored = name in self._possibly_stored and kind not in _NON_MESSAGE_KINDS
@@ -155,7 +155,7 @@ class _Checker:
             return kind
         return str(self._state.options.get(kind.removeprefix("option:"), ""))
 
-    def _need(self, direction: str, key: str, user: str, location: SourceLocation, key_list: str = "") -> None:
+    def _require_key(self, direction: str, key: str, user: str, location: SourceLocation, key_list: str = "") -> None:
         declared = self._inputs if direction == "input" else self._outputs
         if declared is None or key in declared:
             return
@@ -185,10 +185,10 @@ class _Checker:
                 continue
             key_list = "io_keys" if key in (source.default_names("io_keys") or ()) else "input_keys"
             location = self._state.nodes[key_list].location if key_list in self._state.nodes else self._state.location
-            self._need("input", key, source.file.name, location, key_list)
+            self._require_key("input", key, source.file.name, location, key_list)
 
 
-def _declared(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None:
+def _declared_key_union(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None:
     """Returns the union of some key lists of a state; None if one of them is unknown."""
     declared = [declared_keys(state, name) for name in lists]
     return None if None in declared else frozenset(key for keys in declared for key in keys or ())

@@ -63,10 +63,10 @@ class ParamsScope:
             )
             return node
         self.used.add(key)
-        return _moved(value, node)
+        return _relocated_value(value, node)
 
 
-def _moved(value: Node, reference: Node) -> Node:
+def _relocated_value(value: Node, reference: Node) -> Node:
     """Returns a value relocated to its reference, where users look for a mistake.
 
     A value that another file gives keeps its location, because that file must be corrected.

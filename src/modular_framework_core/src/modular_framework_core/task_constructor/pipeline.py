@@ -119,7 +119,7 @@ def main(arguments: Sequence[str], planners_of: Callable[[str], PlannerNames | N
         known = names_of_installation(args.config, args.moveit_config)
         known = known.with_planners(partial(planners_of, args.moveit_config))
         if args.check or args.graph:
-            print(_checked(args, check_task(script, states, templates, known)))
+            print(_draw_and_describe(args, check_task(script, states, templates, known)))
         else:
             output = args.output or generator.default_output_directory()
             print(construct_task(script, states, templates, output, known=known)[1])
@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _checked(args: argparse.Namespace, task: TaskSpec) -> str:
+def _draw_and_describe(args: argparse.Namespace, task: TaskSpec) -> str:
     """Draws a checked task if requested, and returns the message to print."""
     if args.graph:
         task_graph.write(task, args.graph)

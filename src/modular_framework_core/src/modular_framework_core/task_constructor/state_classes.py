@@ -11,7 +11,7 @@ import functools
 from dataclasses import dataclass
 from pathlib import Path
 
-_FRAMEWORK = Path(__file__).resolve().parents[2]
+_FRAMEWORK_CLASS = Path(__file__).resolve().parents[2]
 
 BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
     "FrameworkState": ("success", "fail"),
@@ -122,7 +122,7 @@ def _imports(tree: ast.Module, file: Path) -> dict[str, tuple[Path, str]]:
     for node in tree.body:
         if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
             continue
-        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own_root, _FRAMEWORK)]
+        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own_root, _FRAMEWORK_CLASS)]
         source = next((source for source in sources if source.is_file()), None)
         if source is not None:
             imports |= {item.asname or item.name: (source, item.name) for item in node.names}

@@ -121,5 +121,5 @@ def _remedy(name: str, folders: Sequence[str] | None, file: Path) -> str:
     sibling = file.parent / name
     if folders is None and (sibling.with_suffix(".py").is_file() or sibling.is_dir()):
         return f"it is beside the state, where Python does not look; add {file.parent} to PYTHONPATH"
-    known = sorted({item.name for item in pkgutil.iter_modules(folders)})
-    return f"install it, or add its folder to PYTHONPATH{nearest(name, known)}"
+    known_modules = sorted({item.name for item in pkgutil.iter_modules(folders)})
+    return f"install it, or add its folder to PYTHONPATH{nearest(name, known_modules)}"

@@ -79,7 +79,9 @@ class TaskBuilder:
         name = "task"
         name_node = value_of(document, "name")
         label = str(name_node.value) if isinstance(name_node, Scalar) else name
-        header = self._headers.with_known_keys(self._resolved(document, scope, is_machine=True), label, is_root=True)
+        header = self._headers.with_known_keys(
+            self._resolve_references(document, scope, is_machine=True), label, is_root=True
+        )
         if "name" in header.entries:
             name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
         node_name = name
@@ -152,7 +154,7 @@ class TaskBuilder:
             location=header.location,
         )
 
-    def _resolved(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
+    def _resolve_references(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
         """Resolves the references of a header or state, except in ``UNREAD`` keys."""
         unread = {key for key in node.entries if key in UNREAD or (is_machine and intended_key(key, UNREAD))}
         entries = {
@@ -256,7 +258,7 @@ class TaskBuilder:
         is_machine = "states" in body.entries or bool(self._headers.template_named(value_of(body, "source")))
         params = value_of(body, "params") if is_machine else body.entries.get("params")
         scope = outer_scope.inner(params_of(params, self._faults), self._faults)
-        body = self._resolved(body, scope, is_machine=is_machine)
+        body = self._resolve_references(body, scope, is_machine=is_machine)
         spec: ChildSpec | None
         outcomes: tuple[str, ...] | None
         if is_machine or self._headers.template_named(value_of(body, "source")):

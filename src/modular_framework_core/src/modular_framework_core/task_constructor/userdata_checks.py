@@ -29,12 +29,12 @@ def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> N
         return
     label = f"state '{child.label}': remapping"
     names = header_fields.name_map(node, label, faults, example="{key_of_the_state: key_of_the_machine}")
-    known = _interface_keys(child)
-    if names is None or known is None or not isinstance(node, Mapping):
+    known_keys = _interface_keys(child)
+    if names is None or known_keys is None or not isinstance(node, Mapping):
         return
     for key in names:
-        if key not in known:
-            faults.add_unknown(node.keys[key], f"{label}: key", key, sorted(known), used=names)
+        if key not in known_keys:
+            faults.add_unknown(node.keys[key], f"{label}: key", key, sorted(known_keys), used=names)
 
 
 def _interface_keys(child: ChildSpec) -> set[str] | None:
@@ -68,10 +68,10 @@ def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str
     io_key_counts: Counter[str] = Counter()
     for state in states:
         for key in ("output_keys", "io_keys"):
-            known = _remapped_keys(state, key)
-            if known is None:
+            known_keys = _remapped_keys(state, key)
+            if known_keys is None:
                 return
-            (available if key == "output_keys" else io_key_counts).update(known)
+            (available if key == "output_keys" else io_key_counts).update(known_keys)
     for machine_inside in nested:
         available.update(machine_inside.remapping.get(key, key) for key in machine_inside.output_keys)
     for key, users in io_key_counts.items():

@@ -122,7 +122,7 @@ class TaskRecorder:
             return
         execute = state.execute
 
-        def recorded(userdata: Any) -> str:
+        def execute_and_record(userdata: Any) -> str:
             for attribute in ("reason", "feedback"):
                 if hasattr(state, attribute):
                     setattr(state, attribute, "")
@@ -138,7 +138,7 @@ class TaskRecorder:
             self._end(index, outcome, negative or bool(reason), reason)
             return outcome
 
-        state.execute = recorded  # type: ignore[method-assign]
+        state.execute = execute_and_record  # type: ignore[method-assign]
 
     def _begin(self, path: str, state: smach.State) -> int:
         with self._lock:

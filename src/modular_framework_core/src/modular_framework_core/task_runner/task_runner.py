@@ -114,7 +114,9 @@ class TaskRun:
         if self._result is not None:
             return self._result
         active = ", ".join(self._recorder.active()) or "the construction of the state machine"
-        return self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}, but {active} did not end in time")
+        return self._make_result(
+            "preempted", EXIT_FAILED, f"stopped by {self._stop_cause}, but {active} did not end in time"
+        )
 
     def _run(self) -> None:
         """Creates and executes the state machine; body of the thread."""
@@ -124,17 +126,17 @@ class TaskRun:
         except Exception as error:  # constructors of users' states can raise anything
             smach.logdebug(traceback.format_exc())
             if self._stop.is_set():
-                self._result = self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
+                self._result = self._make_result("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
             else:
                 text = f"the state machine could not be made: {_location_prefix(error)}{type(error).__name__}: {error}"
-                self._result = self._ended("not run", EXIT_NOT_RUN, text)
+                self._result = self._make_result("not run", EXIT_NOT_RUN, text)
             return
         self._recorder.attach(machine)
         with self._lock:
             self._machine = machine
             stopped = self._stop.is_set()
         if stopped:
-            self._result = self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
+            self._result = self._make_result("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
             return
         self._result = self._execute(machine)
 
@@ -142,15 +144,15 @@ class TaskRun:
         try:
             outcome = str(machine.execute(smach.UserData()))
         except smach.InvalidUserCodeError as error:
-            return self._ended("error", EXIT_FAILED, str(error))
+            return self._make_result("error", EXIT_FAILED, str(error))
         except Exception as error:
-            return self._ended("error", EXIT_FAILED, f"{type(error).__name__}: {error}")
+            return self._make_result("error", EXIT_FAILED, f"{type(error).__name__}: {error}")
         if self._stop.is_set():
-            return self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
+            return self._make_result("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
         success = outcome == machine.get_registered_outcomes()[0]
-        return self._ended(outcome, EXIT_SUCCEEDED if success else EXIT_FAILED, "")
+        return self._make_result(outcome, EXIT_SUCCEEDED if success else EXIT_FAILED, "")
 
-    def _ended(self, outcome: str, exit_code: int, error: str) -> TaskResult:
+    def _make_result(self, outcome: str, exit_code: int, error: str) -> TaskResult:
         return TaskResult(self._name, outcome, exit_code, self._recorder.failures(), error)
 
 

@@ -83,7 +83,7 @@ def read_and_check(folder: Path) -> CheckedPackage:
             check_postures(urdf, document, root, lambda uri: str(mesh_path(uri, find_package)), faults)
         files = _check_yaml_files(package, tree, semantics, faults)
         check_launch_files(package, faults)
-    return CheckedPackage(package, tree, semantics, _semantic_description(document), files, faults.sorted())
+    return CheckedPackage(package, tree, semantics, _semantic_description(document), files, faults.sorted_faults())
 
 
 def _semantic_description(document: XmlDocument | None) -> SemanticDescription | None:

@@ -91,7 +91,7 @@ def _load(folder: Path) -> LoadedRobot:
     package = read_config_package(folder, faults)
     urdf, srdf = (package_document(package, path, faults) for path in (package.urdf, package.srdf))
     if urdf is None or srdf is None or package.srdf is None:
-        raise CreationError("\n".join(str(fault) for fault in faults.sorted()))
+        raise CreationError("\n".join(str(fault) for fault in faults.sorted_faults()))
     try:
         model = RobotModel(urdf.text, srdf.text, resolve=lambda uri: str(mesh_path(uri, find_package)))
     except PlanningError as error:

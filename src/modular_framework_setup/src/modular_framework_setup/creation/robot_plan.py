@@ -164,7 +164,7 @@ def _tree(source: SourceUrdf) -> RobotTree:
     faults = FaultList()
     check_tree(tree, faults)
     if faults:
-        raise CreationError("\n".join(map(str, faults.sorted())))
+        raise CreationError("\n".join(map(str, faults.sorted_faults())))
     return tree
 
 

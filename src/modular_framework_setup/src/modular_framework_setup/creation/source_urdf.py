@@ -54,7 +54,7 @@ def read_source(path: Path, arguments: Mapping[str, str], package: str) -> Sourc
         document = read_document(path, arguments, faults)
         root = parse_document(document, faults) if document else None
         if root is None:
-            raise CreationError("\n".join(map(str, faults.sorted())))
+            raise CreationError("\n".join(map(str, faults.sorted_faults())))
         copies: dict[str, Path] = {}
         missing = [item.get("filename", "") for item in root.iter("mesh") if not _relocate(item, path, package, copies)]
     if missing:

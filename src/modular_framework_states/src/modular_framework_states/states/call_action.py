@@ -16,7 +16,7 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
-from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
+from modular_framework_states.message_filling import FillingError, difference, fill_message, with_userdata
 from modular_framework_states.responses import (
     KeptFields,
     MessageFields,
@@ -71,7 +71,7 @@ class CallAction(FrameworkState):
         name = rospy.resolve_name(self._name)
         try:
             action_type = self._type_of(name)
-            goal = filled(type(action_type().action_goal.goal), self._goal, userdata)
+            goal = fill_message(type(action_type().action_goal.goal), self._goal, userdata)
             expected = with_userdata(self._expected, userdata)
             client = SteadyActionClient(name, action_type)
             wait_for_action(client, name, self._server_timeout_s)
@@ -103,16 +103,19 @@ class CallAction(FrameworkState):
         return end_by_response(self, self._rules, response, userdata)
 
     def _type_of(self, name: str) -> Any:
-        found: list[str] = []
+        found_types: list[str] = []
 
-        def known() -> bool:
+        def is_type_known() -> bool:
             kind, _, _ = rostopic.get_topic_type(f"{name}/goal")
-            found[:] = [kind] if kind else []
+            found_types[:] = [kind] if kind else []
             return bool(kind)
 
-        if not wait_until(lambda: known() or self.preempt_requested(), self._server_timeout_s, 0.1) or not found:
+        if (
+            not wait_until(lambda: is_type_known() or self.preempt_requested(), self._server_timeout_s, 0.1)
+            or not found_types
+        ):
             raise CallError(f"nobody offers it within {self._server_timeout_s:.1f} s; start its node")
-        action_type = roslib.message.get_message_class(found[0].removesuffix("Goal"))
+        action_type = roslib.message.get_message_class(found_types[0].removesuffix("Goal"))
         if action_type is None:
-            raise CallError(f"its type {found[0].removesuffix('Goal')} is not built in this workspace")
+            raise CallError(f"its type {found_types[0].removesuffix('Goal')} is not built in this workspace")
         return action_type

@@ -12,7 +12,7 @@ from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, call_service, wait_until
-from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
+from modular_framework_states.message_filling import FillingError, difference, fill_message, with_userdata
 from modular_framework_states.responses import (
     KeptFields,
     MessageFields,
@@ -74,7 +74,7 @@ class CallService(FrameworkState):
             if self.preempt_requested():
                 return self.stopped()
             service_type = rosservice.get_service_class_by_name(name)
-            request = filled(service_type._request_class, self._request, userdata)
+            request = fill_message(service_type._request_class, self._request, userdata)
             expected = with_userdata(self._expected, userdata)
             response = call_service(rospy.ServiceProxy(name, service_type), request, self._timeout_s)
         except (CallError, FillingError, rosservice.ROSServiceException) as error:

@@ -84,7 +84,7 @@ class CartesianMove(FrameworkState):
         if self._offset is None:
             return fetch("pose", self._pose_name)
         (tip,) = link_poses(commander, [commander.group.tip_link], TIMEOUT_S)
-        return moved(tip, self._offset, self._in_tip)
+        return translate_pose(tip, self._offset, self._in_tip)
 
     def _path(self, commander: Any, target: PoseStamped) -> Any:
         request = self._request
@@ -95,7 +95,7 @@ class CartesianMove(FrameworkState):
         return request_service("compute_cartesian_path", GetCartesianPath, request, TIMEOUT_S)
 
 
-def moved(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> PoseStamped:
+def translate_pose(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> PoseStamped:
     """Returns a pose translated by an offset.
 
     Args:

@@ -74,7 +74,7 @@ class Grasp(FrameworkState):
     def _holds(self, name: str) -> bool:
         """Waits until the planning scene has an object attached to the manipulator; any object if no name is given."""
 
-        def attached() -> bool:
+        def is_attached() -> bool:
             return any(is_named(held, name) for held in held_objects())
 
-        return wait_until(lambda: self.preempt_requested() or attached(), SCENE_TIMEOUT_S, SCENE_PERIOD_S)
+        return wait_until(lambda: self.preempt_requested() or is_attached(), SCENE_TIMEOUT_S, SCENE_PERIOD_S)

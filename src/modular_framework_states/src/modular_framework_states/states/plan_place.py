@@ -88,7 +88,7 @@ class PlanPlace(FrameworkState):
             return self.fail("userdata 'selected_support' is empty; select the support first")
         try:
             scene = read_place_scene(commander, grasp, support)
-            result, text = self._planned(commander, self._goal(commander, scene))
+            result, text = self._plan_place(commander, self._goal(commander, scene))
             if self.preempt_requested():
                 return self.stopped()
             if result is None or result.error_code.val != result.error_code.SUCCESS:
@@ -122,7 +122,7 @@ class PlanPlace(FrameworkState):
         goal.planning_options.plan_only = True
         return goal
 
-    def _planned(self, commander: Any, goal: PlaceGoal) -> tuple[Any, str]:
+    def _plan_place(self, commander: Any, goal: PlaceGoal) -> tuple[Any, str]:
         """Returns the result of the action, or None without a result, and the text of the action."""
         client = SteadyActionClient(PLACE_ACTION, PlaceAction)
         wait_for_action(client, PLACE_ACTION, SERVER_TIMEOUT_S)

@@ -15,7 +15,7 @@ from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.grasp_goals import GraspGoalError, send
-from modular_framework_states.held_objects import detach, held_objects, moved, object_poses
+from modular_framework_states.held_objects import detach, have_moved, held_objects, object_poses
 from modular_framework_states.manipulator_postures import posture_grasp, posture_positions
 
 SIMULATION_PARAMETER = "simulation"
@@ -71,7 +71,7 @@ class Release(FrameworkState):
             if self.preempt_requested():
                 return self.stopped()
             remaining = held_objects()
-            rests = bool(remaining) or self._rest(released)
+            rests = bool(remaining) or self._wait_for_rest(released)
         except (RobotModelError, GraspGoalError, CallError) as error:
             return self.fail(f"release by the posture '{self._posture}': {error}")
         if remaining:
@@ -98,18 +98,18 @@ class Release(FrameworkState):
         self._pass_time()
         return False
 
-    def _rest(self, objects: list[str]) -> bool:
+    def _wait_for_rest(self, objects: list[str]) -> bool:
         """Waits until objects are at rest for the rest time; returns whether they are."""
         if not objects:
             return True
         poses, since_s = object_poses(objects), rospy.get_time()
 
-        def at_rest() -> bool:
+        def is_at_rest() -> bool:
             nonlocal poses, since_s
             self._pass_time()
             current = object_poses(objects)
-            if moved(poses, current):
+            if have_moved(poses, current):
                 poses, since_s = current, rospy.get_time()
             return rospy.get_time() - since_s >= self._rest_s
 
-        return self.wait_until(at_rest, self._timeout_s, SCENE_PERIOD_S)
+        return self.wait_until(is_at_rest, self._timeout_s, SCENE_PERIOD_S)

@@ -37,12 +37,12 @@ class Wait(FrameworkState):
         """Waits until the duration has passed."""
         if self._time.enabled:
             return self._wait_in_held_time()
-        begun = rospy.Time.now()
-        if self.wait_until(lambda: (rospy.Time.now() - begun).to_sec() >= self._duration_s, self._timeout_s):
+        start_time = rospy.Time.now()
+        if self.wait_until(lambda: (rospy.Time.now() - start_time).to_sec() >= self._duration_s, self._timeout_s):
             return self.succeed()
         if self.preempt_requested():
             return self.stopped()
-        passed = (rospy.Time.now() - begun).to_sec()
+        passed = (rospy.Time.now() - start_time).to_sec()
         return self.fail(
             f"only {passed:.2f} of {self._duration_s} s passed on the ROS clock within "
             f"{self._timeout_s:.1f} s; is the simulation paused or slow?"
