@@ -36,14 +36,14 @@ def _body(entry: dict[str, Any], sources: dict[str, str]) -> Body:
     values: dict[str, Any] = {key: tuple(item) if isinstance(item, list) else item for key, item in entry.items()}
     source = values.pop("source", "")
     try:
-        values["parts"] = tuple(part for item in values["parts"] for part in _parts(dict(item)))
+        values["parts"] = tuple(part for item in values["parts"] for part in _read_parts(dict(item)))
         values["description"] += f" Source: {sources[source]}." if source else ""
         return Body(**values)
     except (KeyError, TypeError, ValueError) as error:
         raise CatalogueError(f"model '{entry.get('name', '')}': {type(error).__name__}: {error}") from error
 
 
-def _parts(item: dict[str, Any]) -> tuple[Part, ...]:
+def _read_parts(item: dict[str, Any]) -> tuple[Part, ...]:
     pose = {key: tuple(item.pop(key)) for key in ("xyz", "rpy") if key in item}
     ((kind, size),) = item.items()
     return ring_of_boxes(**size) if kind == "ring" else (Part(kind, tuple(size), **pose),)

@@ -52,8 +52,8 @@ def _scene_shape(name: str, geometry: specs.Geometry, pose: Pose) -> SceneShape:
             kind, size = "plane", (*geometry.normal, 0.0)
         case _:  # an incomplete planning scene is worse than none
             raise DescriptionError(name, "a collision shape is a mesh", "allowed: box, cylinder, sphere, plane")
-    return SceneShape(kind, _rounded(size), _rounded(pose.position), _rounded(pose.quaternion))
+    return SceneShape(kind, _rounded_vector(size), _rounded_vector(pose.position), _rounded_vector(pose.quaternion))
 
 
-def _rounded(values: Iterable[float]) -> Vector:
+def _rounded_vector(values: Iterable[float]) -> Vector:
     return tuple(round(value, 9) + 0.0 for value in values)

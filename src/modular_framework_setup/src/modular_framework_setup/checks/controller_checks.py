@@ -70,7 +70,7 @@ class ControllerChecker:
         self._check_groups()
 
     def _check_joints(self, owner: str, joints: Sequence[Located]) -> None:
-        seen = set()
+        seen_joints = set()
         for name, where in joints:
             if has_argument(name):
                 continue
@@ -79,9 +79,9 @@ class ControllerChecker:
                 self._faults.add_unknown(where, f"{owner}: joint", name, movable)
             elif self._tree.joints[name].kind == "fixed":
                 self._faults.add(where, f"{owner}: joint '{name}' is fixed and cannot move; remove it")
-            if name in seen:
+            if name in seen_joints:
                 self._faults.add(where, f"{owner}: joint '{name}' is listed twice; remove one entry")
-            seen.add(name)
+            seen_joints.add(name)
 
     def _check_listed(self, controllers: Sequence[MoveItController], kinds: Sequence[str], is_fake: bool) -> None:
         claims: dict[str, MoveItController] = {}
@@ -184,7 +184,7 @@ class ControllerChecker:
         if self._semantics is None:
             return
         for group in self._semantics.groups.values():
-            moved = [self._moved(controllers) & set(group.active) for controllers in self._moveit_files]
+            moved = [self._moved_joints(controllers) & set(group.active) for controllers in self._moveit_files]
             best = max(moved, key=len, default=set())
             if not best or len(best) == len(group.active):
                 continue
@@ -197,5 +197,5 @@ class ControllerChecker:
             )
 
     @staticmethod
-    def _moved(controllers: Sequence[MoveItController]) -> set[str]:
+    def _moved_joints(controllers: Sequence[MoveItController]) -> set[str]:
         return {joint for item in controllers for joint, _ in item.joints}

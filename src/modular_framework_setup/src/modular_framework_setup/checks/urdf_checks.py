@@ -49,13 +49,13 @@ def check_tree(tree: RobotTree, faults: FaultList) -> None:
 def _check_names(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
     for noun, items in (("link", robot.links), ("joint", robot.joints)):
         count = Counter(item.name for item in items)
-        seen = set()
+        seen_names = set()
         for item in items:
             if not item.name:
                 faults.add(tree.location(item.line), f"a {noun} has no name; give it one")
-            elif count[item.name] > 1 and item.name in seen:
+            elif count[item.name] > 1 and item.name in seen_names:
                 faults.add(tree.location(item.line), f"{noun} '{item.name}' exists twice; rename one of them")
-            seen.add(item.name)
+            seen_names.add(item.name)
     children: set[str] = set()
     for joint in robot.joints:
         if joint.child in children:

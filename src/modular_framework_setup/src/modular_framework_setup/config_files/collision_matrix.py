@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 REASONS = ("Adjacent", "Default", "Always", "Never")
 """Computed reasons; a pair with any other reason was added by the user."""
-MARK = "compute_self_collisions"
+AUTHOR_MARK = "compute_self_collisions"
 """Mark in the comment above a computed matrix."""
 _COMMENT_OR_PAIR = re.compile(
     r"[ \t]*(?:<!--(?P<comment>.*?)-->|<disable_collisions\b[^>]*?(?:/>|>.*?</disable_collisions\s*>))[ \t]*\n?", re.S
@@ -43,8 +43,12 @@ def with_matrix(srdf: str, disabled: Mapping[tuple[str, str], str], origin: str)
     Raises:
         MatrixError: The SRDF has neither a matrix nor a closing `</robot>` tag.
     """
-    block = f"  <!-- Written by {MARK}: {origin}. -->\n{matrix_text(disabled)}"
-    old = [match for match in _COMMENT_OR_PAIR.finditer(srdf) if match["comment"] is None or MARK in match["comment"]]
+    block = f"  <!-- Written by {AUTHOR_MARK}: {origin}. -->\n{matrix_text(disabled)}"
+    old = [
+        match
+        for match in _COMMENT_OR_PAIR.finditer(srdf)
+        if match["comment"] is None or AUTHOR_MARK in match["comment"]
+    ]
     if not old:
         end = _END.search(srdf)
         if end is None:

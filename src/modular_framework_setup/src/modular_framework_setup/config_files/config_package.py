@@ -94,10 +94,10 @@ def folder_of(name: str) -> Path:
     try:
         return Path(packages.get_path(name))
     except rospkg.ResourceNotFound as error:
-        known = [item for item in packages.list() if item.endswith("_config")]
+        config_packages = [item for item in packages.list() if item.endswith("_config")]
         raise NoConfigPackageError(
             f"'{name}' is neither a folder nor a ROS package; allowed: a folder, or a package on ROS_PACKAGE_PATH "
-            f"(config packages there: {', '.join(known) or 'none'}){nearest(name, packages.list())}; "
+            f"(config packages there: {', '.join(config_packages) or 'none'}){nearest(name, packages.list())}; "
             "correct the name, or source the setup.bash of the package's workspace"
         ) from error
 
@@ -112,8 +112,8 @@ def packages_beside(folder: Path) -> Iterator[None]:
         (parent for parent in (folder, *folder.parents) if (parent / "package.xml").is_file()), folder
     ).resolve()
     old_path = os.environ.get("ROS_PACKAGE_PATH")
-    known = {Path(path).resolve() for path in _package_paths()}
-    if own_folder in known:
+    known_folders = {Path(path).resolve() for path in _package_paths()}
+    if own_folder in known_folders:
         yield
         return
     added = [

@@ -44,9 +44,9 @@ class RobotTree:
 
     def up(self, link: str) -> Iterator[Joint]:
         """Yields the joints from a link up to the root, or to the end of a cycle."""
-        seen = set()
-        while (joint := self.parent_joint.get(link)) is not None and link not in seen:
-            seen.add(link)
+        seen_links = set()
+        while (joint := self.parent_joint.get(link)) is not None and link not in seen_links:
+            seen_links.add(link)
             yield joint
             link = joint.parent
 

@@ -249,7 +249,7 @@ def _states(
     for gripper in parts.grippers:
         opened, closed = ends[gripper.name]
         states[gripper.name] = {
-            name: {gripper.driver: _rounded(model, gripper.driver, value)}
+            name: {gripper.driver: _rounded_position(model, gripper.driver, value)}
             for name, value in (("open", opened), ("closed", closed))
         }
         positions = with_gripper(model, positions, gripper, opened)
@@ -264,9 +264,9 @@ def _states(
 
 
 def _values(model: RobotModel, arm: Arm, positions: Array) -> dict[str, float]:
-    return {name: _rounded(model, name, positions[model.index[name]]) for name in arm.joints}
+    return {name: _rounded_position(model, name, positions[model.index[name]]) for name in arm.joints}
 
 
-def _rounded(model: RobotModel, joint: str, value: float) -> float:
+def _rounded_position(model: RobotModel, joint: str, value: float) -> float:
     index = model.index[joint]
     return float(np.clip(round(float(value), 4), model.lower[index], model.upper[index])) + 0.0
