@@ -24,7 +24,7 @@ class PlaceAction(ManipulationAction):
         def read(scene: PlanningScene, index: int, hand: Hand) -> Manoeuvre:
             held = held_object(scene, goal.attached_object_name, hand)
             return place_manoeuvre(
-                scene, goal, goal.place_locations[index], hand=hand, held=held, source_name=f"place_locations[{index}]"
+                scene, goal, goal.place_locations[index], hand=hand, held=held, field_name=f"place_locations[{index}]"
             )
 
         def accept(index: int) -> None:
