@@ -23,6 +23,8 @@ STOP_TIMEOUT_S = 15.0
 
 KILL_POLL_S = 0.01
 """Polling period for remaining processes [s]."""
+LOADING_S = 0.1
+"""Maximum time during which the environment of a new process is empty [s]."""
 
 PORT_RANGE = range(12000, 32000)
 """Ports of masters, below those that Linux assigns by default."""
@@ -51,7 +53,7 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
     mark, process_ids = f"{variable}={value}".encode(), set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # process ended or belongs to another user
-            entries = (folder / "environ").read_bytes().split(b"\0")
+            entries = _environment(folder).split(b"\0")
             marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
             if marked and int(folder.name) != os.getpid():
                 process_ids.add(int(folder.name))
@@ -59,6 +61,22 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
     while children := {process_id for process_id, parent in parents.items() if parent in process_ids} - process_ids:
         process_ids |= children
     return sorted(process_ids - {os.getpid()})
+
+
+def _environment(process: Path) -> bytes:
+    """Returns the environment of a process.
+
+    Linux shows an empty environment while it loads the program of a new process, so an empty one is read again.
+
+    Args:
+        process: Folder of the process in /proc.
+    """
+    end_s = time.monotonic() + LOADING_S
+    while not (entries := (process / "environ").read_bytes()) and time.monotonic() < end_s:
+        if not (process / "exe").exists():  # a kernel thread, or a process that has ended
+            break
+        time.sleep(0.001)
+    return entries
 
 
 def kill_processes_with(variable: str, value: str, prefix: bool = False, timeout_s: float = math.inf) -> int:
