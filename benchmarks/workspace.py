@@ -44,7 +44,7 @@ def _enter() -> None:
 
 
 def _help() -> None:
-    """Starts the benchmark again in the workspace as it is built, or prints its docstring and ends it."""
+    """Starts the benchmark again in the built workspace, or prints its docstring and ends it."""
     space = "install" if os.environ.get("INSTALL_SPACE") == "1" else "devel"
     if (ROOT / space / "setup.bash").exists():
         sourced = f'source "{ROOT}/install.sh" && source_workspace && exec "$@"'

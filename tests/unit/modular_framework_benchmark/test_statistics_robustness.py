@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robustness curves: rates, intervals and fits as computed independently; nothing is said beyond the tested levels."""
+"""Robustness curves: rates, intervals and fits as computed independently, and only for the tested levels."""
 
 from __future__ import annotations
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models.changed_model import changed_model
+from modular_framework_simulation.models.model_variants import changed_model, scaled_model
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.scaled_models import scaled_model
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 from modular_framework_simulation.models.sdf_specs import Model

@@ -10,7 +10,7 @@ import pytest
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.model_extents import bounding_box
-from modular_framework_simulation.models.scaled_models import scaled_model
+from modular_framework_simulation.models.model_variants import scaled_model
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 

@@ -28,9 +28,9 @@ from modular_framework_benchmark.records.episode_settings import model_file
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
-from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_model_text, read_world
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.body_urdf import model_to_urdf

@@ -19,8 +19,7 @@ from modular_framework_benchmark.records.episode_settings import PlacedObject, m
 from modular_framework_benchmark.records.perturbation import ObjectPerturbation
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models.changed_model import changed_model
-from modular_framework_simulation.models.scaled_models import read_scaled
+from modular_framework_simulation.models.model_variants import changed_model, read_scaled
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE, PERCEPTION_SERVICE = (

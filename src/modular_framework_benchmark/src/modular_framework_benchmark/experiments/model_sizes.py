@@ -9,8 +9,8 @@ from pathlib import Path
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.model_extents import bounding_box, reach
+from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 from modular_framework_urdf.rotations import rotate_vector

@@ -26,8 +26,7 @@ from modular_framework_core.files.located_yaml import Mapping, Node, kind_of
 from modular_framework_core.files.located_yaml import Sequence as ListNode
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, renamed_key
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models.changed_model import changed_model
-from modular_framework_simulation.models.scaled_models import read_scaled
+from modular_framework_simulation.models.model_variants import changed_model, read_scaled
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 SURFACE, OLD_SURFACE = "rests_at", "on"
@@ -91,7 +90,7 @@ class SceneObject:
         return PlacedObject(self.name, self.model, scale=scale, perturbed=self._drawn_perturbation(key), **numbers)
 
     def _scale(self, key: tuple[object, ...]) -> float | None:
-        """Returns the factor of the model's lengths; None for the model as it is."""
+        """Returns the factor of the model's lengths; None for the size of the model file."""
         perturbed = self.perturbation.object_size
         if self.size is None:
             return None if perturbed == 1.0 else perturbed

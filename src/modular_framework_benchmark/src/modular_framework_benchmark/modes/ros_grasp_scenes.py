@@ -17,8 +17,8 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.gazebo_ros.conversions import link_to_collision_object
+from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.scaled_models import read_scaled
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 

@@ -2,7 +2,7 @@
 """Errors of perception: the planning scene shows models displaced from their true poses.
 
 A wrong pose estimate, or a wrong calibration from robot base to camera, displaces an object that the camera sees. The
-world stays as it is; only the snapshot for the planning scene changes.
+world does not change; only the snapshot for the planning scene changes.
 """
 
 from __future__ import annotations

@@ -67,7 +67,9 @@ SRDF = (
     "<disable_collisions link1='link_1' link2='link_2' reason='Adjacent'/>"
     "<disable_collisions link1='link_2' link2='link_3' reason='Adjacent'/></robot>"
 )
-LIMITS = {"joint_limits": {name: {"has_acceleration_limits": True, "max_acceleration": 5.0} for name in JOINTS}}
+LIMITS = {
+    "joint_limits": {name: {"has_acceleration_limits": True, "max_acceleration": MAX_ACCELERATION} for name in JOINTS}
+}
 
 
 class PlannerConformance:
