@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 
 from modular_framework_testing.ros_session import RosSession
 from modular_framework_testing.ros_session_report import pytest_runtest_makereport  # noqa: F401
+from modular_framework_testing.virtual_screen import virtual_screen
 
 
 @pytest.fixture(scope="session")
@@ -56,10 +56,5 @@ def ros_launch(ros_session: RosSession) -> Callable[..., RosSession]:
 @pytest.fixture(scope="module")
 def screen() -> Iterator[str]:
     """A new X server without a monitor; its display name."""
-    reading, writing = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-nolisten", "tcp"], pass_fds=[writing])
-    os.close(writing)
-    with os.fdopen(reading) as answer:
-        yield f":{answer.readline().strip()}"
-    server.terminate()
-    server.wait(20.0)
+    with virtual_screen() as display:
+        yield display
