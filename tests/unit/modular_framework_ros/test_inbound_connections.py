@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import socket
+import struct
+import threading
+import time
 from collections.abc import Iterator
 from queue import Queue
 from typing import Any
@@ -67,6 +70,29 @@ def test_a_subscriber_is_accepted_while_another_client_sends_no_header(
         other_protocol.sendall(b"POST /RPC2 HTTP/1.1\r\n\r\n")
         write_ros_handshake_header(subscriber, {"topic": "/joint_states"})
         assert node.headers.get(timeout=10.0) == {"topic": "/joint_states"}
+
+
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_connection_that_its_client_closes_unused_is_no_warning(
+    new_node: Node, reset: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Subscribers of rospy close such connections, for example after they learned of a publisher twice."""
+    warnings: list[str] = []
+    monkeypatch.setattr(tcpros_base, "logwarn", lambda text, *values: warnings.append(text % values))
+    unused = new_node.connection()
+    if reset:
+        unused.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    unused.close()
+    with new_node.connection() as incomplete:
+        incomplete.sendall(b"\0")
+    deadline = time.monotonic() + 10.0
+    while (not warnings or threads_of_connections()) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert len(warnings) == 1 and "1 bytes were received" in warnings[0], warnings
+
+
+def threads_of_connections() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "inbound_connection"]
 
 
 def test_many_connections_may_be_pending(new_node: Node) -> None:

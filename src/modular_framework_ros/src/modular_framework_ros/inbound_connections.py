@@ -5,6 +5,10 @@ rospy reads the header of a connection before it accepts the next one. A client 
 such as a port scanner or a caller of a dead node whose port is used again, would keep all further clients waiting until
 it closes its connection. In addition, rospy's queue holds five pending connections, and every service call opens one or
 two connections: Linux drops the sixth connection, and its client retries after a second.
+
+A connection that its client closes before it sends a byte is closed without a warning. rospy's subscribers open such
+connections: a subscriber that learns of a publisher twice, from the reply to its registration and from the master's
+update, opens two connections and closes the first.
 """
 
 from __future__ import annotations
@@ -42,6 +46,20 @@ def accept_connections_at_once() -> None:
 
 def _on_own_thread(handler: _Handler) -> _Handler:
     def handle(client: socket.socket, address: tuple[str, int]) -> None:
-        threading.Thread(target=handler, args=(client, address), name="inbound_connection", daemon=True).start()
+        threading.Thread(target=accept, args=(client, address), name="inbound_connection", daemon=True).start()
+
+    def accept(client: socket.socket, address: tuple[str, int]) -> None:
+        if _is_unused(client):
+            client.close()
+        else:
+            handler(client, address)
 
     return handle
+
+
+def _is_unused(client: socket.socket) -> bool:
+    """Waits for the first byte; returns True if the client closed the connection or the socket's timeout passed."""
+    try:
+        return not client.recv(1, socket.MSG_PEEK)
+    except OSError:
+        return True
