@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes ur_arm_on_ros.py known to the tests beside it."""
+"""Lets the tests of this folder import its other modules."""
 
 from __future__ import annotations
 

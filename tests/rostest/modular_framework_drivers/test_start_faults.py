@@ -4,18 +4,15 @@
 from __future__ import annotations
 
 import collections
+import multiprocessing
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 import rospy
-import serial
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from faulty_grippers import GRIPPER_CASES, emulate_grippers
 
-from modular_framework_drivers.ezgripper import mx64
-from modular_framework_testing.emulators.dynamixel_finger import Finger, FingerModel
-from modular_framework_testing.emulators.dynamixel_line import DynamixelLine
-from modular_framework_testing.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 from modular_framework_testing.ros_session import until
 
@@ -45,25 +42,6 @@ CASES: dict[str, tuple[str, dict[str, object], str]] = {
 }
 
 
-GRIPPER_CASES: dict[str, tuple[Callable[[DynamixelLine], object], int, str]] = {
-    "no_cable": (DynamixelLine.unplug, 57600, "cannot be opened: No such file or directory; check the cable"),
-    "no_gripper_power": (DynamixelLine.power_off, 57600, "at 57600 baud does not respond"),
-    "another_baud_rate": (lambda line: None, 115200, "at 115200 baud does not respond"),
-    "another_id": (lambda line: line.change_id(7), 57600, "servo 1 on"),
-    "another_model": (
-        lambda line: line.fingers[0].servo.set(mx64.MODEL_NUMBER, 12),
-        57600,
-        "servo 1 is model 12; expected 310 (MX-64)",
-    ),
-    "port_in_use": (
-        lambda line: serial.Serial(str(line.link), exclusive=True),
-        57600,
-        "cannot be opened: another program uses it",
-    ),
-}
-"""Function that spoils a gripper before the start and returns what to keep, baud rate of the driver, and fault text."""
-
-
 class Drivers:
     """The running drivers, as a client of `/diagnostics` sees them.
 
@@ -90,22 +68,26 @@ def drivers(
     ros_session: Any, ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Drivers]:
     made, arms = Drivers(ros_session), [EmulatedArm() for _ in CASES]
-    lines, nodes, kept = [], [], []
-    for name, (spoil, baudrate, _) in GRIPPER_CASES.items():
-        port = tmp_path_factory.mktemp(name) / "gripper"
-        line = DynamixelLine([Finger(DynamixelServo(), FingerModel())], port)
-        line.connect()
-        lines.append(line)
-        kept.append(spoil(line))
-        nodes.append(NODE.format(name=name, type="EzGripperRobotHW", address="nowhere", port=port, baudrate=baudrate))
+    ports = {name: tmp_path_factory.mktemp(name) / "gripper" for name in GRIPPER_CASES}
+    spawn = multiprocessing.get_context("spawn")  # a process of its own, which shares no interpreter with the test
+    ours, theirs = spawn.Pipe()
+    grippers = spawn.Process(target=emulate_grippers, args=(ports, theirs))
+    grippers.start()
+    theirs.close()
+    assert ours.recv() == "ready"
+    nodes = [
+        NODE.format(name=name, type="EzGripperRobotHW", address="nowhere", port=ports[name], baudrate=baudrate)
+        for name, (_, baudrate, _) in GRIPPER_CASES.items()
+    ]
     for (name, (command, arguments, _)), arm in zip(CASES.items(), arms, strict=True):
         arm.command(command, **arguments)
         nodes.append(NODE.format(name=name, type="UrArmRobotHW", address=arm.address, port="none", baudrate=57600))
     ros_launch(f"<launch>{''.join(nodes)}{SPAWNER}</launch>")
     yield made
-    kept.clear()
-    for device in (*arms, *lines):
-        device.close()
+    ours.close()
+    grippers.join(10.0)
+    for arm in arms:
+        arm.close()
 
 
 @pytest.mark.parametrize(
