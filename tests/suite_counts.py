@@ -63,7 +63,7 @@ def count_of(code: int, results: Path, log: str) -> Count:
         failed = int(suite.get("failures", 0)) + int(suite.get("errors", 0))
         count += Count(total - skipped - failed, failed, skipped)
     ended_badly = code not in (0, NO_TESTS_COLLECTED) and not count.failed
-    is_empty = count == Count() and not re.search(r"^\d+ deselected in ", log, re.MULTILINE)
+    is_empty = count == Count() and not re.search(r"^\d+ deselected\b.* in ", log, re.MULTILINE)
     return count + Count(failed=ended_badly or is_empty)
 
 

@@ -96,6 +96,7 @@ def report(results: Path, tests: int, failures: int = 0, skipped: int = 0) -> Pa
         (0, 0, 0, 5, "no tests ran in 0.1s", "0 passed, 1 failed, 0 skipped"),
         (2, 0, 2, 0, "2 skipped in 0.1s", "0 passed, 0 failed, 2 skipped"),
         (0, 0, 0, 5, "\n4 deselected in 0.1s\n", "0 passed, 0 failed, 0 skipped"),
+        (0, 0, 0, 5, "\n4 deselected, 1 warning in 0.1s\n", "0 passed, 0 failed, 0 skipped"),
     ],
 )
 def test_a_suite_without_tests_and_one_that_ends_badly_are_failures(
