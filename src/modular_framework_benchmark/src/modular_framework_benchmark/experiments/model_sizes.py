@@ -82,9 +82,13 @@ def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
     spec = _read(model)
     shapes = [collision.geometry for link in spec.links for collision in link.collisions]
     if not shapes:
-        raise DescriptionError(str(model), "got no <collision>", "allowed: a model with one; give z instead of on")
+        raise DescriptionError(
+            str(model), "got no <collision>", "allowed: a model with one; give z instead of rests_at"
+        )
     if any(isinstance(shape, specs.Plane) for shape in shapes):
-        raise DescriptionError("<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on")
+        raise DescriptionError(
+            "<collision>", "got a plane", "allowed: a shape of limited size; give z instead of rests_at"
+        )
     to_model = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0)).inverse()
     return -reach(spec, rotate_vector(to_model.quaternion, (0.0, 0.0, -1.0)))
 
