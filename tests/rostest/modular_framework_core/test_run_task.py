@@ -24,10 +24,11 @@ from moveit_msgs.srv import (
 )
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker
 
 from modular_framework_core.srv import ListMessages, ListMessagesRequest
 from modular_framework_ros.calls import CallError, call_service
-from modular_framework_testing.ros_session import RosSession, executable
+from modular_framework_testing.ros_session import RosSession, executable, until
 
 FROZEN_WITHIN_S = 10.0
 """From the stop of a node's process to the end of what waits for it [s]."""
@@ -264,6 +265,31 @@ def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
     assert events[1]["outcome"] == "fail"
     assert events[1]["reason"] == "the door is locked"
     assert events[2]["succeeded"] is False
+
+
+def test_rviz_shows_the_running_state_and_the_reason_of_a_failure_above_the_arm(run) -> None:
+    rospy.set_param(
+        "/robot_description",
+        '<robot name="arm"><link name="floor"/><link name="post"/><link name="turret"/>'
+        '<joint name="bolt" type="fixed"><parent link="floor"/><child link="post"/><origin xyz="0 0 0.7"/></joint>'
+        '<joint name="pan" type="continuous"><parent link="post"/><child link="turret"/><origin xyz="0.1 0 0.2"/>'
+        "</joint></robot>",
+    )
+    shown: list[Marker] = []
+    subscriber = rospy.Subscriber("task_marker", Marker, shown.append)
+    try:
+        nap = "states:\n  - Nap: {source: nap, transitions: {success: A, fail: A}}\n"
+        process = run(BAD.replace("states:\n", nap))
+        until(lambda: [marker.text for marker in shown] == ["tiny\nNap"], "the first state")
+        rospy.set_param("/alarm", True)
+        process.end()
+        until(lambda: len(shown) == 3, "the result")
+    finally:
+        subscriber.unregister()
+        rospy.delete_param("/robot_description")
+    assert [marker.text for marker in shown[1:]] == ["tiny\nA", "tiny\nFAILED: gave_up\nA: the door is locked"]
+    assert {(marker.type, marker.header.frame_id) for marker in shown} == {(Marker.TEXT_VIEW_FACING, "post")}
+    assert {(marker.pose.position.x, marker.pose.position.z > 0.9) for marker in shown} == {(0.1, True)}
 
 
 @pytest.fixture()

@@ -17,7 +17,7 @@ Parameters (without an argument):
 Services: ``~stop`` (std_srvs/Trigger) requests a stop like SIGINT and answers at once. With ``~wait_for_start``,
     ``~start`` (std_srvs/Trigger) starts the task and answers at once.
 Publishers: ``task_outcome`` (std_msgs/String, latched); ``task_status`` (std_msgs/String, JSON, latched), at every
-    start and end of a state and twice a second in between; the topics of ``ros_introspection``.
+    start and end of a state and twice a second in between; the topics of ``ros_introspection`` and ``ros_state_text``.
 Exit code: 0 for the task's success outcome (its first), 1 for other outcomes, 2 if the task could not be run.
 """
 
@@ -47,6 +47,7 @@ from modular_framework_core.task_constructor.known_names import KnownNames, Plan
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder
 from modular_framework_core.task_runner.ros_introspection import with_introspection
+from modular_framework_core.task_runner.ros_state_text import StateText
 from modular_framework_core.task_runner.task_runner import (
     EXIT_NOT_RUN,
     EXIT_SUCCEEDED,
@@ -102,6 +103,7 @@ class TaskReporter:
         self._started = time.monotonic()
         self._status = rospy.Publisher("task_status", String, queue_size=100, latch=True)
         self._outcome = rospy.Publisher("task_outcome", String, queue_size=1, latch=True)
+        self._text = StateText(name)
 
     def on_state(self, record: StateRecord, active: tuple[str, ...]) -> None:
         """Publishes the start or end of a state; logs the first start."""
@@ -112,6 +114,8 @@ class TaskReporter:
             clock = time.strftime("%H:%M:%S", time.localtime(launched))
             rospy.loginfo(f"first state running: {record.path} after {time.time() - launched:.1f} s since {clock}")
         ended = record.ended_s is not None
+        if not ended:
+            self._text.show_state(record.path)
         self._publish(
             {
                 "task": self._name,
@@ -154,6 +158,7 @@ class TaskReporter:
             frozen: Description of the nodes that are frozen at the end of the task; "" if there are none.
         """
         self._outcome.publish(String(result.outcome))
+        self._text.show_result(result)
         self._publish(
             {
                 "task": self._name,
