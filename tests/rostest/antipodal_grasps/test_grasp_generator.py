@@ -3,17 +3,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-pytest.register_assert_rewrite("grasp_generator_suite")
-from grasp_generator_suite import *  # noqa: E402, F403
-from grasp_generator_suite import Method  # noqa: E402
+from modular_framework_testing.grasping.generator_conformance import GraspGeneratorConformance
 
 
-@pytest.fixture(scope="module")
-def method() -> Method:
-    return Method("antipodal_grasps", "antipodal_grasp_generator", "between two opposite sides")
+class TestAntipodalGrasps(GraspGeneratorConformance):
+    """Grasps between opposite sides of an object."""
+
+    package, node, manner = "antipodal_grasps", "antipodal_grasp_generator", "between two opposite sides"

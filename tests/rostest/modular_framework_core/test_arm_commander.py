@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
 import rospy
@@ -16,9 +14,7 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 from modular_framework_core.commander import arm_commander
 from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message
-
-sys.path.insert(0, str(Path(__file__).parent))
-from fake_move_group import FakeMoveGroup  # noqa: E402
+from modular_framework_testing.grasping.fake_move_group import FakeMoveGroup
 
 
 @pytest.fixture(scope="module")

@@ -18,14 +18,18 @@ from geometry_msgs.msg import TransformStamped
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2, PointField
 
+from modular_framework_testing.grasping.fake_move_group import FakeMoveGroup
+from modular_framework_testing.grasping.generator_conformance import (
+    BOX_SIZE,
+    GraspGeneratorConformance,
+    assert_holds_box,
+    next_grasp,
+    renew_grasps,
+)
 from modular_framework_testing.ros_session import until as wait_until
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
-pytest.register_assert_rewrite("grasp_generator_suite")
 from depth_camera import AXES, EYE, Box, image  # noqa: E402
-from grasp_generator_suite import *  # noqa: E402, F403
-from grasp_generator_suite import FakeMoveGroup, Method, Watcher, renew  # noqa: E402
 
 TOPIC, FRAME = "camera/points", "camera_optical"
 TABLE = Box((2.0, 2.0, 0.02), (0.0, 0.5, 0.83))
@@ -92,108 +96,100 @@ class FakeCamera:
             setattr(self, name, value)
 
 
-@pytest.fixture(scope="module")
-def method() -> Method:
-    return Method(
-        "point_cloud_grasps", "point_cloud_grasp_generator", "between two opposite sides that the camera sees"
-    )
+class TestPointCloudGrasps(GraspGeneratorConformance):
+    """Grasps between opposite sides that a camera sees."""
 
+    package, node = "point_cloud_grasps", "point_cloud_grasp_generator"
+    manner = "between two opposite sides that the camera sees"
+    camera: FakeCamera
 
-@pytest.fixture(scope="module")
-def scene(ros_session, ros_launch, method: Method) -> FakeMoveGroup:
-    fake = FakeMoveGroup()
-    fake.reach = 0.5
-    fake.watcher, fake.camera = Watcher(), FakeCamera(fake)
-    rospy.set_param("pointcloud_topic_name", TOPIC)
-    fake.session = ros_launch(method.launch)
-    return fake
+    @classmethod
+    def prepare(cls) -> None:
+        cls.camera = FakeCamera(cls.scene)
+        rospy.set_param("pointcloud_topic_name", TOPIC)
 
+    def test_the_camera_is_subscribed_to_only_while_a_cloud_is_waited_for(self) -> None:
+        self.set_parameter("name_prefix", "")
+        until(lambda: not self.camera.watched, "the camera without a subscriber")
+        seen = []
 
-def test_the_camera_is_subscribed_to_only_while_a_cloud_is_waited_for(scene, method: Method) -> None:
-    method.set("name_prefix", "")
-    until(lambda: not scene.camera.watched, "the camera without a subscriber")
-    seen = []
+        def remember(points: np.ndarray) -> np.ndarray:
+            seen.append(self.camera.watched)
+            return points
 
-    def remember(points: np.ndarray) -> np.ndarray:
-        seen.append(scene.camera.watched)
-        return points
+        with self.camera.changed(change=remember):
+            assert self.generate()[0]
+        assert seen and seen[0]
+        until(lambda: not self.camera.watched, "the camera without a subscriber")
 
-    with scene.camera.changed(change=remember):
-        assert method.generate()[0]
-    assert seen and seen[0]
-    until(lambda: not scene.camera.watched, "the camera without a subscriber")
+    def test_an_unorganised_cloud_with_holes_does_too(self) -> None:
+        def unorganised(points: np.ndarray) -> np.ndarray:
+            flat = points.reshape(1, -1, 3).copy()
+            flat[:, ::10] = np.nan
+            return flat[:, np.random.default_rng(1).permutation(flat.shape[1])]
 
-
-def test_an_unorganised_cloud_with_holes_does_too(scene, method: Method) -> None:
-    def unorganised(points: np.ndarray) -> np.ndarray:
-        flat = points.reshape(1, -1, 3).copy()
-        flat[:, ::10] = np.nan
-        return flat[:, np.random.default_rng(1).permutation(flat.shape[1])]
-
-    with scene.camera.changed(change=unorganised):
-        success, text = method.generate()
-    assert success, text
-
-
-@pytest.mark.parametrize(
-    ("change", "cause"),
-    [
-        (lambda points: np.full_like(points, np.nan), "has no finite point among 640 x 480"),
-        (lambda points: points[:0], "has no finite point among 640 x 0"),
-        (lambda points: points + [0.0, 0.0, -0.6], "the cloud has 0 points on 'box__link'"),
-    ],
-)
-def test_a_cloud_that_shows_nothing_is_a_failure_with_its_cause(scene, method: Method, change, cause: str) -> None:
-    with scene.camera.changed(change=change):
-        success, text = method.generate()
-    assert not success and cause in text
-
-
-def test_a_cloud_in_a_frame_that_nobody_knows_is_a_failure_that_names_it(scene, method: Method) -> None:
-    with scene.camera.changed(frame="nowhere"):
-        success, text = method.generate()
-    assert not success
-    assert f"'/{TOPIC}' is in frame 'nowhere', which has no transform to 'world'" in text and FRAME in text
-
-
-def test_no_cloud_in_time_is_a_failure_that_names_the_topic(scene, method: Method) -> None:
-    method.set("cloud_timeout", 1.0)
-    method.set("point_cloud_topic", "other/points")
-    success, text = method.generate()
-    assert not success
-    assert "no point cloud arrived on topic '/other/points' within 1 s, nobody publishes it" in text
-    method.set("point_cloud_topic", "")
-    method.set("cloud_timeout", 60.0)
-    assert method.generate()[0]
-
-
-def test_a_task_waits_for_an_object_that_the_first_cloud_did_not_show(scene, method: Method) -> None:
-    box = scene.objects.pop()
-    answers: list[tuple[bool, str]] = []
-    method.set("scene_timeout", 60.0)
-    task = threading.Thread(target=lambda: answers.append(renew()))
-    until(lambda: not scene.camera.watched, "the camera without a subscriber")
-    task.start()
-    until(lambda: scene.camera.watched, "the generator waits for a cloud")
-    until(lambda: not scene.camera.watched, "the generator has a cloud without an object")
-    assert not answers
-    scene.objects.append(box)
-    task.join(60.0)
-    method.set("scene_timeout", 1.0)
-    assert answers and answers[0][0], answers
-
-
-def test_what_the_scene_does_not_know_is_found_in_the_cloud(scene, method: Method) -> None:
-    known, scene.objects = scene.objects, [item for item in scene.objects if not item.id.startswith("box")]
-    try:
-        success, text = method.generate()
-        assert not success
-        assert "in the crop box" in text and "is on the plane at 0.840 m" in text
-        with scene.camera.changed(unknown=[Box(BOX_SIZE, (-0.1, 0.4, 0.89))]):  # noqa: F405
-            success, text = method.generate()
+        with self.camera.changed(change=unorganised):
+            success, text = self.generate()
         assert success, text
-        grasp = get_grasp().grasp_message  # noqa: F405
-        assert grasp.object_id == "seen_1"
-        assert_between_the_pads(grasp, -0.1, 0.4)  # noqa: F405
-    finally:
-        scene.objects = known
+
+    @pytest.mark.parametrize(
+        ("change", "cause"),
+        [
+            (lambda points: np.full_like(points, np.nan), "has no finite point among 640 x 480"),
+            (lambda points: points[:0], "has no finite point among 640 x 0"),
+            (lambda points: points + [0.0, 0.0, -0.6], "the cloud has 0 points on 'box__link'"),
+        ],
+    )
+    def test_a_cloud_that_shows_nothing_is_a_failure_with_its_cause(self, change, cause: str) -> None:
+        with self.camera.changed(change=change):
+            success, text = self.generate()
+        assert not success and cause in text
+
+    def test_a_cloud_in_a_frame_that_nobody_knows_is_a_failure_that_names_it(self) -> None:
+        with self.camera.changed(frame="nowhere"):
+            success, text = self.generate()
+        assert not success
+        assert f"'/{TOPIC}' is in frame 'nowhere', which has no transform to 'world'" in text and FRAME in text
+
+    def test_no_cloud_in_time_is_a_failure_that_names_the_topic(self) -> None:
+        self.set_parameter("cloud_timeout", 1.0)
+        self.set_parameter("point_cloud_topic", "other/points")
+        success, text = self.generate()
+        assert not success
+        assert "no point cloud arrived on topic '/other/points' within 1 s, nobody publishes it" in text
+        self.set_parameter("point_cloud_topic", "")
+        self.set_parameter("cloud_timeout", 60.0)
+        assert self.generate()[0]
+
+    def test_a_task_waits_for_an_object_that_the_first_cloud_did_not_show(self) -> None:
+        box = self.scene.objects.pop()
+        answers: list[tuple[bool, str]] = []
+        self.set_parameter("scene_timeout", 60.0)
+        task = threading.Thread(target=lambda: answers.append(renew_grasps()))
+        until(lambda: not self.camera.watched, "the camera without a subscriber")
+        task.start()
+        until(lambda: self.camera.watched, "the generator waits for a cloud")
+        until(lambda: not self.camera.watched, "the generator has a cloud without an object")
+        assert not answers
+        self.scene.objects.append(box)
+        task.join(60.0)
+        self.set_parameter("scene_timeout", 1.0)
+        assert answers and answers[0][0], answers
+
+    def test_what_the_scene_does_not_know_is_found_in_the_cloud(self) -> None:
+        known, self.scene.objects = (
+            self.scene.objects,
+            [item for item in self.scene.objects if not item.id.startswith("box")],
+        )
+        try:
+            success, text = self.generate()
+            assert not success
+            assert "in the crop box" in text and "is on the plane at 0.840 m" in text
+            with self.camera.changed(unknown=[Box(BOX_SIZE, (-0.1, 0.4, 0.89))]):
+                success, text = self.generate()
+            assert success, text
+            grasp = next_grasp().grasp_message
+            assert grasp.object_id == "seen_1"
+            assert_holds_box(grasp, -0.1, 0.4)
+        finally:
+            self.scene.objects = known

@@ -3,29 +3,28 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-pytest.register_assert_rewrite("grasp_generator_suite")
-from grasp_generator_suite import *  # noqa: E402, F403
-from grasp_generator_suite import BOX_SIZE, Method, get_grasp  # noqa: E402
+from modular_framework_testing.grasping.generator_conformance import (
+    BOX_SIZE,
+    BOX_Z,
+    GraspGeneratorConformance,
+    next_grasp,
+)
 
 
-@pytest.fixture(scope="module")
-def method() -> Method:
-    return Method("top_down_grasps", "top_down_grasp_generator", "from above")
+class TestTopDownGrasps(GraspGeneratorConformance):
+    """Grasps from above."""
 
+    package, node, manner = "top_down_grasps", "top_down_grasp_generator", "from above"
 
-def test_the_best_grasp_of_a_box_is_over_its_centre_and_open_a_little_wider(scene, method: Method) -> None:
-    scene.objects = scene.objects[:1]
-    scene.add_box("box__link", BOX_SIZE, (0.05, 0.5, 0.89))
-    method.set("name_prefix", "")
-    assert method.generate()[0]
-    best = get_grasp().grasp_message
-    place = best.grasp.pose.pose.position
-    assert (place.x, place.y) == pytest.approx((0.05, 0.5), abs=1e-6)
-    opening = 0.12 - 0.01 - 2 * best.pregrasp.posture.position[0]
-    assert opening == pytest.approx(0.04 + 2 * 0.012, abs=1e-3)
+    def test_the_best_grasp_of_a_box_is_over_its_centre_and_open_a_little_wider(self) -> None:
+        self.scene.objects = self.scene.objects[:1]
+        self.scene.add_box("box__link", BOX_SIZE, (0.05, 0.5, BOX_Z))
+        self.set_parameter("name_prefix", "")
+        assert self.generate()[0]
+        best = next_grasp().grasp_message
+        place = best.grasp.pose.pose.position
+        assert (place.x, place.y) == pytest.approx((0.05, 0.5), abs=1e-6)
+        opening = 0.12 - 0.01 - 2 * best.pregrasp.posture.position[0]
+        assert opening == pytest.approx(0.04 + 2 * 0.012, abs=1e-3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A move_group of a robot with two sliding axes and a gripper, for tests of its clients."""
+"""A fake move_group of a gripper on two sliding axes, for tests of clients."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import contextlib
 import json
 import threading
 import time
+from typing import Any
 
 import actionlib
 import rospy
@@ -15,6 +16,7 @@ from moveit_msgs.msg import (
     ContactInformation,
     ExecuteTrajectoryAction,
     ExecuteTrajectoryResult,
+    MotionPlanRequest,
     MoveItErrorCodes,
     PlannerInterfaceDescription,
 )
@@ -34,6 +36,8 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_testing.ros_session import until
 
 URDF = """<robot name="r"><link name="world"/><link name="x_link"/><link name="y_link"/><link name="palm"/>
 <link name="left"><collision>
@@ -56,19 +60,24 @@ SRDF = """<robot name="r"><group name="arm"><chain base_link="world" tip_link="t
 
 
 class FakeMoveGroup:
-    """Answers as move_group does; the attributes change what it answers.
+    """Offers the services and the action of move_group; the attributes determine the responses.
+
+    Inverse kinematics moves the axes jx and jy to the x and y of the requested pose, whatever its orientation.
 
     Attributes:
-        reach: Greatest x that inverse kinematics can reach [m].
-        blocked: y from which on a state is in collision with ``wall`` [m].
-        blocked_for_current_fingers: x from which on it is so while the fingers are as they are [m].
-        plan_error: Error code of planning instead of a plan.
-        reason: Reason reported on the planning report topic.
-        execution_error: Error code of executing.
-        slow: True lets a motion last until it is cancelled.
-        moving: Set when a motion begins.
-        scene_requests: How often the scene was asked for.
+        reach: Largest x of a reachable pose [m].
+        blocked: Largest y of a state without a collision with `wall` [m].
+        blocked_for_current_fingers: The same for x, in requests that leave the fingers at their positions [m].
+        plan_error: Error code of every plan; 0 for successful plans.
+        reason: Reason of failed plans on the topic of planning reports.
+        execution_error: Error code of every execution; 0 for successful executions.
+        slow: Whether a motion lasts until its cancellation.
+        canceled: Whether a motion was canceled.
+        moving: Set at the start of a motion.
+        scene_requests: Number of requests for the planning scene.
+        positions: Joint positions in joint_states, by name [m].
         objects: Collision objects of the scene.
+        requests: Received motion plan requests.
     """
 
     def __init__(self) -> None:
@@ -78,7 +87,7 @@ class FakeMoveGroup:
         self.moving, self.scene_requests = threading.Event(), 0
         self.positions = {"jx": 0.0, "jy": 0.0, "f": 0.02}
         self.objects: list[CollisionObject] = []
-        self.requests: list = []
+        self.requests: list[MotionPlanRequest] = []
         rospy.set_param("robot_description", URDF)
         rospy.set_param("robot_description_semantic", SRDF)
         self._joints = rospy.Publisher("joint_states", JointState, queue_size=1)
@@ -95,7 +104,13 @@ class FakeMoveGroup:
         threading.Thread(target=self._publish, daemon=True).start()
 
     def add_box(self, name: str, size: tuple[float, float, float], centre: tuple[float, float, float]) -> None:
-        """Puts a box into the scene."""
+        """Adds a box to the scene.
+
+        Args:
+            name: Name of the object.
+            size: Edge lengths [m].
+            centre: Position of the centre in the world frame [m].
+        """
         box = CollisionObject(id=name)
         box.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=list(size))]
         box.primitive_poses = [type(box.pose)()]
@@ -103,11 +118,16 @@ class FakeMoveGroup:
         self.objects = [*self.objects, box]
 
     def wait_for_listeners(self, timeout_s: float = 60.0) -> None:
-        """Waits until somebody listens to the reports of failed plans."""
-        deadline = time.monotonic() + timeout_s
-        while not self._report.get_num_connections():
-            assert time.monotonic() < deadline, "nobody listens to the planning reports"
-            time.sleep(0.02)
+        """Waits for a subscriber of the planning reports.
+
+        Args:
+            timeout_s: Maximum wait [s].
+        """
+        until(
+            lambda: bool(self._report.get_num_connections()),
+            "a subscriber of the planning reports",
+            timeout_s=timeout_s,
+        )
 
     def _publish(self) -> None:
         with contextlib.suppress(rospy.ROSException):
@@ -115,7 +135,7 @@ class FakeMoveGroup:
                 self._joints.publish(JointState(name=list(self.positions), position=list(self.positions.values())))
                 time.sleep(0.02)
 
-    def _planners(self, _):
+    def _planners(self, _: Any) -> QueryPlannerInterfacesResponse:
         return QueryPlannerInterfacesResponse(
             [
                 PlannerInterfaceDescription(pipeline_id="ompl", planner_ids=["RRTConnect", "RRT", "arm[Quick]"]),
@@ -124,7 +144,7 @@ class FakeMoveGroup:
             ]
         )
 
-    def _plan(self, request):
+    def _plan(self, request: Any) -> GetMotionPlanResponse:
         self.requests.append(request.motion_plan_request)
         response = GetMotionPlanResponse()
         answer, goal = response.motion_plan_response, request.motion_plan_request.goal_constraints[0]
@@ -141,7 +161,7 @@ class FakeMoveGroup:
         answer.error_code.val = MoveItErrorCodes.SUCCESS
         return response
 
-    def _ik(self, request):
+    def _ik(self, request: Any) -> GetPositionIKResponse:
         wanted, response = request.ik_request, GetPositionIKResponse()
         place = wanted.pose_stamped.pose.position
         if place.x > self.reach or (wanted.avoid_collisions and place.y > self.blocked):
@@ -151,7 +171,7 @@ class FakeMoveGroup:
         response.error_code.val = MoveItErrorCodes.SUCCESS
         return response
 
-    def _validity(self, request):
+    def _validity(self, request: Any) -> GetStateValidityResponse:
         joints = request.robot_state.joint_state
         at = dict(zip(joints.name, joints.position, strict=True))
         fingers_collide = "f" not in at and at["jx"] > self.blocked_for_current_fingers
@@ -161,13 +181,14 @@ class FakeMoveGroup:
             valid=False, contacts=[ContactInformation(contact_body_1="palm", contact_body_2="wall")]
         )
 
-    def _scene(self, request):
+    def _scene(self, request: Any) -> GetPlanningSceneResponse:
         self.scene_requests += 1
         response = GetPlanningSceneResponse()
         response.scene.world.collision_objects = self.objects
         return response
 
-    def _execute(self, goal):
+    def _execute(self, goal: Any) -> None:
+        del goal
         self.moving.set()
         while self.slow and not self._server.is_preempt_requested():
             time.sleep(0.01)
