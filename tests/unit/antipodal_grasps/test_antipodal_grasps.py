@@ -18,7 +18,7 @@ import trimesh
 
 from antipodal_grasps.antipodal import AntipodalSettings, antipodal_grasps
 from modular_framework_core.grasp_generation import solid_meshes, surface_points
-from modular_framework_core.grasp_generation.grasp_candidates import GraspQuery
+from modular_framework_core.grasp_generation.grasp_candidates import GraspQuery, NoCandidatesError
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry, measure_gripper
 from modular_framework_core.grasp_generation.hand_poses import HandSettings
 from modular_framework_core.grasp_generation.pair_grasps import PairGrasp
@@ -189,7 +189,10 @@ def test_nothing_is_offered_where_the_hand_has_no_room() -> None:
     ]
     gripper = geometry(*GRIPPERS[0])
     assert antipodal_grasps(query(OBJECTS["can"], gripper, TABLE), SETTINGS)
-    assert not antipodal_grasps(query(OBJECTS["can"], gripper, TABLE, *walls), SETTINGS)
+    with pytest.raises(
+        NoCandidatesError, match=r"^all \d+ hand poses that fit .* \d+ of them with '(left|right|front|back)'"
+    ):
+        antipodal_grasps(query(OBJECTS["can"], gripper, TABLE, *walls), SETTINGS)
 
 
 def test_what_is_wider_than_the_gripper_opens_cannot_be_grasped() -> None:

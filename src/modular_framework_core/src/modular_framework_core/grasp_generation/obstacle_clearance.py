@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -26,12 +27,19 @@ class ObstacleClearance:
         obstacles: All objects of the scene except the target.
         gripper: Geometry of the hand.
         limit_m: Maximum distance of interest [m]; obstacles beyond this distance are ignored.
+
+    Attributes:
+        collisions: Number of checked grasps that collide with each obstacle, by name; a grasp counts once.
     """
 
     def __init__(self, obstacles: Sequence[SceneObject], gripper: GripperGeometry, limit_m: float = 0.1) -> None:
         self._gripper, self._limit = gripper, limit_m
-        solids = [solid for obstacle in obstacles for solid in obstacle.solids]
-        self._bodies = [(_tree(solid), solid.vertices.min(axis=0), solid.vertices.max(axis=0)) for solid in solids]
+        self.collisions: Counter[str] = Counter()
+        self._bodies = [
+            (obstacle.name, _tree(solid), solid.vertices.min(axis=0), solid.vertices.max(axis=0))
+            for obstacle in obstacles
+            for solid in obstacle.solids
+        ]
         self._hulls: dict[tuple[int, int, float], Any] = {}
         corners = np.concatenate([part.corners.reshape(-1, 3) for part in gripper.parts])
         self._radius = float(np.linalg.norm(corners, axis=1).max())
@@ -50,7 +58,9 @@ class ObstacleClearance:
         start = position - approach_distance_m * hand_axes[:, 2]
         reach = self._radius + self._limit
         low, high = np.minimum(start, position) - reach, np.maximum(start, position) + reach
-        near = [body for body, lower, upper in self._bodies if (lower < high).all() and (upper > low).all()]
+        near = [
+            (name, body) for name, body, lower, upper in self._bodies if (lower < high).all() and (upper > low).all()
+        ]
         if not near:
             return self._limit
         advancing, closed = (self._sample(opening) for opening in openings)
@@ -61,11 +71,12 @@ class ObstacleClearance:
             hulls = [self._hull(index, advancing, approach_distance_m)]
             hulls += [self._hull(index, sample, 0.0) for sample in closing if sample != advancing]
             for hull in hulls:
-                for body in near:
+                for name, body in near:
                     distance = coal.distance(hull, pose, body, coal.Transform3s.Identity(),
                                              coal.DistanceRequest(), coal.DistanceResult())  # fmt: skip
                     min_distance = min(min_distance, distance)
                     if min_distance <= 0.0:
+                        self.collisions[name] += 1
                         return 0.0
         return float(min_distance)
 

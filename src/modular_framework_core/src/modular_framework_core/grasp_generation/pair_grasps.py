@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from modular_framework_core.grasp_generation.contact_pair import ContactPair
-from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery
+from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery, NoCandidatesError
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
 from modular_framework_core.grasp_generation.hand_poses import HandPose, HandSettings, hand_axes_for, place_hand
 from modular_framework_core.grasp_generation.obstacle_clearance import ObstacleClearance
@@ -85,7 +85,11 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
 
     Returns:
         Collision-free grasps in the order for reachability checks. The order alternates between inclinations of the
-        hand, best grasps first, because the arm may reach the object with a single inclination only.
+        hand, best grasps first, because the arm may reach the object with a single inclination only. Empty if no pose
+        of the hand fits the object.
+
+    Raises:
+        NoCandidatesError: Every pose of the hand that fits the object collides with other objects.
     """
     surroundings = ObstacleClearance(query.obstacles, query.gripper, settings.full_clearance_m)
     grasps: list[PairGrasp] = []
@@ -102,6 +106,12 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
             grasps.append(_rate_grasp(pose, clearance, query, settings))
             if len(grasps) >= settings.max_candidates:
                 break
+    if surroundings.collisions and not grasps:
+        name, count = surroundings.collisions.most_common(1)[0]
+        raise NoCandidatesError(
+            f"all {surroundings.collisions.total()} hand poses that fit the object collide with other objects during "
+            f"approach or closing, {count} of them with '{name}'"
+        )
     return _interleave_angle_bins([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
 
 
