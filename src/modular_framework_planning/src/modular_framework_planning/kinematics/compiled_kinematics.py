@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled forward kinematics and least-squares inverse kinematics, about one microsecond per state."""
+"""Compiled forward kinematics, about one microsecond per state, and least-squares inverse kinematics."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.geometry.spatial import Array
 
-POSE_SIZE = 6
-SMALL_ANGLE = 1.0e-8
-MAX_STEP = 0.5  # maximum joint displacement in a step of the search [rad or m]
+POSE_SIZE = 6  # rows of a pose error: translation and rotation vector
+SMALL_ANGLE = 1.0e-8  # a rotation with a smaller sine is treated as a rotation by 0 or pi
+MAX_STEP = 0.5  # maximum joint displacement in a step of `converge` [rad or m]
+MAX_SEED_STEP = 0.3  # maximum joint displacement in a step of `approach_seed` [rad or m]
 
 
 class Tree(NamedTuple):
@@ -21,9 +22,9 @@ class Tree(NamedTuple):
 
     Attributes:
         parents: Index of the parent joint, -1 for the planning frame, shape (n,).
-        placements: Pose of each joint at zero in the parent's frame, shape (n, 3, 4).
-        axes: Unit axis in the joint frame, shape (n, 3).
-        prismatic: Whether the joint is prismatic instead of revolute, shape (n,).
+        placements: Pose of each joint at position zero in its parent's frame, shape (n, 3, 4).
+        axes: Unit axis of each joint in the joint's frame, shape (n, 3).
+        prismatic: Whether each joint is prismatic instead of revolute, shape (n,).
     """
 
     parents: NDArray[np.int64]
@@ -35,12 +36,14 @@ class Tree(NamedTuple):
 class Chain(NamedTuple):
     """A kinematic chain from the planning frame to a tip, driven by the joint values of a group.
 
+    The value of a joint is offset + gain * values[driver], or offset if the driver is -1.
+
     Attributes:
         tree: Joints of the chain, each the parent of the next.
         tip: Pose of the tip in the last joint's frame, shape (3, 4).
         drivers: Index of the group value that drives each joint, -1 for none, shape (n,).
-        gains: Gain of the group value, shape (n,).
-        offsets: Value of each joint if all group values are 0, shape (n,).
+        gains: Gain of each joint, shape (n,).
+        offsets: Offset of each joint, shape (n,) [rad or m].
     """
 
     tree: Tree
@@ -51,10 +54,17 @@ class Chain(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _write_column(
-    frames: Array, parent: int, a: float, b: float, c: float, column: int, out: Array, index: int
-) -> None:
-    """Writes the vector (a, b, c) of a parent's frame as a column of out[index]; column 3 is a point."""
+def joint_distance(first: Array, second: Array) -> float:
+    """Returns the Euclidean distance between two joint vectors, shape (joints,) each [rad or m]."""
+    squared_distance = 0.0
+    for joint in range(len(first)):
+        squared_distance += (second[joint] - first[joint]) ** 2
+    return np.sqrt(squared_distance)
+
+
+@njit(cache=True, nogil=True)
+def _write_column(frames: Array, parent: int, a: float, b: float, c: float, column: int, index: int) -> None:
+    """Writes a column of frames[index], which is (a, b, c) in the parent's frame; column 3 is a point."""
     for row in range(3):
         if parent < 0:
             value = a if row == 0 else (b if row == 1 else c)
@@ -62,7 +72,7 @@ def _write_column(
             value = frames[parent, row, 0] * a + frames[parent, row, 1] * b + frames[parent, row, 2] * c
             if column == 3:
                 value += frames[parent, row, 3]
-        out[index, row, column] = value
+        frames[index, row, column] = value
 
 
 @njit(cache=True, nogil=True)
@@ -72,7 +82,7 @@ def joint_placements(tree: Tree, positions: Array, out: Array) -> None:
     Args:
         tree: Joints.
         positions: Joint values, including mimic joints, shape (n,) [rad or m].
-        out: Output poses, shape (n, 3, 4).
+        out: Written poses, shape (n, 3, 4).
     """
     placements, axes = tree.placements, tree.axes
     for index in range(len(tree.parents)):
@@ -81,26 +91,14 @@ def joint_placements(tree: Tree, positions: Array, out: Array) -> None:
         slide, sine, cosine = value, 0.0, 1.0
         if not tree.prismatic[index]:
             slide, sine, cosine = 0.0, np.sin(value), np.cos(value)
-        one_minus_cosine = 1.0 - cosine
+        versine = 1.0 - cosine
         for column in range(4):  # rotation (Rodrigues) or translation of the joint, transformed to the parent's frame
             if column == 0:
-                a, b, c = (
-                    cosine + x * x * one_minus_cosine,
-                    y * x * one_minus_cosine + z * sine,
-                    z * x * one_minus_cosine - y * sine,
-                )
+                a, b, c = cosine + x * x * versine, y * x * versine + z * sine, z * x * versine - y * sine
             elif column == 1:
-                a, b, c = (
-                    x * y * one_minus_cosine - z * sine,
-                    cosine + y * y * one_minus_cosine,
-                    z * y * one_minus_cosine + x * sine,
-                )
+                a, b, c = x * y * versine - z * sine, cosine + y * y * versine, z * y * versine + x * sine
             elif column == 2:
-                a, b, c = (
-                    x * z * one_minus_cosine + y * sine,
-                    y * z * one_minus_cosine - x * sine,
-                    cosine + z * z * one_minus_cosine,
-                )
+                a, b, c = x * z * versine + y * sine, y * z * versine - x * sine, cosine + z * z * versine
             else:
                 a, b, c = slide * x, slide * y, slide * z
             d = placements[index, 0, 0] * a + placements[index, 0, 1] * b + placements[index, 0, 2] * c
@@ -108,17 +106,17 @@ def joint_placements(tree: Tree, positions: Array, out: Array) -> None:
             f = placements[index, 2, 0] * a + placements[index, 2, 1] * b + placements[index, 2, 2] * c
             if column == 3:
                 d, e, f = d + placements[index, 0, 3], e + placements[index, 1, 3], f + placements[index, 2, 3]
-            _write_column(out, parent, d, e, f, column, out, index)
+            _write_column(out, parent, d, e, f, column, index)
 
 
 @njit(cache=True, nogil=True)
 def rotation_vector(first: Array, second: Array, out: Array) -> None:
-    """Writes the rotation vector from `first` to `second` in their common frame [rad].
+    """Writes the rotation vector from `first` to `second`: log(second first^T), in their common frame [rad].
 
     Args:
-        first: Pose or rotation, whose leading 3 x 3 block is used.
-        second: Pose or rotation, whose leading 3 x 3 block is used.
-        out: Output rotation vector, shape (3,).
+        first: Rotation matrix or pose, shape (3, 3) or (3, 4).
+        second: Rotation matrix or pose, shape (3, 3) or (3, 4).
+        out: Written rotation vector, shape (3,).
     """
     xx = second[0, 0] * first[0, 0] + second[0, 1] * first[0, 1] + second[0, 2] * first[0, 2]
     xy = second[0, 0] * first[1, 0] + second[0, 1] * first[1, 1] + second[0, 2] * first[1, 2]
@@ -145,23 +143,23 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
             out[0], out[1], out[2] = xy, yy + 1.0, zy
         else:
             out[0], out[1], out[2] = xz, yz, zz + 1.0
-        size = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+        norm = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
         for row in range(3):
-            out[row] *= angle / size
+            out[row] *= angle / norm
 
 
 @njit(cache=True, nogil=True)
 def pose_error(
     chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array, poses: Array
 ) -> float:
-    """Computes the pose error of the tip and the Jacobian; returns the norm of the error.
+    """Computes the pose error of the tip and its geometric Jacobian; returns the norm of the error.
 
     Args:
         chain: Joints from the planning frame to the tip.
-        values: Joint values of the group [rad or m].
+        values: Joint values of the group, shape (group,) [rad or m].
         target: Target pose of the tip in the planning frame, shape (3, 4).
-        jacobian: Output Jacobian, linear above angular, shape (6, group).
-        error: Output difference from tip to target, linear [m] above angular [rad], shape (6,).
+        jacobian: Written Jacobian, linear rows above angular rows, shape (6, group).
+        error: Written difference from tip to target, linear [m] above angular [rad], shape (6,).
         positions: Working memory, shape (joints,).
         poses: Working memory, shape (joints + 1, 3, 4); the last pose is the pose of the tip.
     """
@@ -174,7 +172,7 @@ def pose_error(
     joint_placements(chain.tree, positions, poses)
     end = chain.tip
     for column in range(4):
-        _write_column(poses, count - 1, end[0, column], end[1, column], end[2, column], column, poses, count)
+        _write_column(poses, count - 1, end[0, column], end[1, column], end[2, column], column, count)
     tip = poses[count]
     for row in range(3):
         error[row] = target[row, 3] - tip[row, 3]
@@ -202,10 +200,10 @@ def pose_error(
             jacobian[3, driver] += gain * x
             jacobian[4, driver] += gain * y
             jacobian[5, driver] += gain * z
-    total = 0.0
+    squared_norm = 0.0
     for row in range(POSE_SIZE):
-        total += error[row] * error[row]
-    return np.sqrt(total)
+        squared_norm += error[row] * error[row]
+    return np.sqrt(squared_norm)
 
 
 @njit(cache=True, nogil=True)
@@ -219,15 +217,15 @@ def damped_step(
     factor: Array,
     solution: Array,
 ) -> None:
-    """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping.
+    """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping I.
 
     Args:
         jacobian: J, shape (>= rows, joints).
-        error: Error, shape (>= rows,).
-        rows: Number of rows to use.
+        error: Right-hand side, shape (>= rows,).
+        rows: Number of rows of the problem.
         damping: Damping factor.
         free: Whether each joint may move, shape (joints,); fixed joints get a step of 0.
-        step: Output step, shape (joints,).
+        step: Written step, shape (joints,).
         factor: Working memory, shape (>= rows, >= rows).
         solution: Working memory, shape (>= rows,).
     """
@@ -262,11 +260,15 @@ def damped_step(
 def converge(
     chain: Chain, values: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int
 ) -> bool:
-    """Moves joint values within bounds until the tip is at the target; returns whether it arrived.
+    """Moves joint values within bounds until the tip is at the target; returns whether the tip is at the target.
+
+    The damping of a step grows with the squared error, as in T. Sugihara, "Solvability-unconcerned inverse kinematics
+    by the Levenberg-Marquardt method", IEEE T-RO 27 (2011). A joint at a bound stays fixed if the step would violate
+    the bound; the step is then computed again.
 
     Args:
         chain: Joints from the planning frame to the tip.
-        values: Joint values of the group, changed in place [rad or m].
+        values: Joint values of the group, changed in place, shape (group,) [rad or m].
         target: Target pose of the tip in the planning frame, shape (3, 4).
         lower: Lower bounds of the group, shape (group,).
         upper: Upper bounds of the group, shape (group,).
@@ -278,22 +280,22 @@ def converge(
     positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     step, solution, free = np.empty(width), np.empty(POSE_SIZE), np.empty(width, dtype=np.bool_)
     for _ in range(steps):
-        size = pose_error(chain, values, target, jacobian, error, positions, poses)
-        if size < tolerance:
+        error_norm = pose_error(chain, values, target, jacobian, error, positions, poses)
+        if error_norm < tolerance:
             return True
-        damping = min(1.0e-3, 0.1 * size * size) + 1.0e-14
+        damping = min(1.0e-3, 0.1 * error_norm * error_norm) + 1.0e-14
         free[:] = True
         for _attempt in range(2):
             damped_step(jacobian, error, POSE_SIZE, damping, free, step, factor, solution)
-            blocked = False
+            is_blocked = False
             for joint in range(width):
                 if free[joint] and (
                     (values[joint] <= lower[joint] and step[joint] < 0.0)
                     or (values[joint] >= upper[joint] and step[joint] > 0.0)
                 ):
                     free[joint] = False
-                    blocked = True
-            if not blocked:
+                    is_blocked = True
+            if not is_blocked:
                 break
         max_change = 1.0e-12
         for joint in range(width):
@@ -317,11 +319,11 @@ def polish(
     max_error: float,
     steps: int,
 ) -> NDArray[np.bool_]:
-    """Refines approximate solutions in place; returns whether each of them arrived at the target.
+    """Refines approximate solutions by `converge`; returns whether each candidate converged, shape (k,).
 
     Args:
         chain: Joints from the planning frame to the tip.
-        candidates: Joint values, changed in place, shape (k, group).
+        candidates: Joint values, changed in place, shape (k, group) [rad or m].
         target: Target pose of the tip in the planning frame, shape (3, 4).
         lower: Lower bounds of the group, shape (group,).
         upper: Upper bounds of the group, shape (group,).
@@ -330,27 +332,27 @@ def polish(
         steps: Maximum number of steps.
     """
     count, width = candidates.shape
-    arrived = np.zeros(count, dtype=np.bool_)
+    has_converged = np.zeros(count, dtype=np.bool_)
     jacobian, error = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE)
     positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
     for index in range(count):
-        size = pose_error(chain, candidates[index], target, jacobian, error, positions, poses)
-        if size < max_error:
-            arrived[index] = size < tolerance or converge(
+        error_norm = pose_error(chain, candidates[index], target, jacobian, error, positions, poses)
+        if error_norm < max_error:
+            has_converged[index] = error_norm < tolerance or converge(
                 chain, candidates[index], target, lower, upper, tolerance, steps
             )
-    return arrived
+    return has_converged
 
 
 @njit(cache=True, nogil=True)
 def search(
     chain: Chain, starts: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int, max_count: int
 ) -> NDArray[np.bool_]:
-    """Runs `converge` from each start until enough have arrived; returns whether each of them arrived.
+    """Runs `converge` from each start until `max_count` solutions are found; returns whether each start converged.
 
     Args:
         chain: Joints from the planning frame to the tip.
-        starts: Initial joint values, changed in place, shape (k, group).
+        starts: Initial joint values, changed in place, shape (k, group) [rad or m].
         target: Target pose of the tip in the planning frame, shape (3, 4).
         lower: Lower bounds of the group, shape (group,).
         upper: Upper bounds of the group, shape (group,).
@@ -358,14 +360,14 @@ def search(
         steps: Maximum number of steps per start.
         max_count: Number of solutions that ends the search.
     """
-    arrived = np.zeros(len(starts), dtype=np.bool_)
-    arrived_count = 0
+    has_converged = np.zeros(len(starts), dtype=np.bool_)
+    solution_count = 0
     for index in range(len(starts)):
-        arrived[index] = converge(chain, starts[index], target, lower, upper, tolerance, steps)
-        arrived_count += int(arrived[index])
-        if arrived_count >= max_count:
+        has_converged[index] = converge(chain, starts[index], target, lower, upper, tolerance, steps)
+        solution_count += int(has_converged[index])
+        if solution_count >= max_count:
             break
-    return arrived
+    return has_converged
 
 
 @njit(cache=True, nogil=True)
@@ -374,10 +376,13 @@ def approach_seed(
 ) -> None:
     """Moves a solution of a redundant chain closer to the seed while the tip stays at the target.
 
+    Each step projects the difference from the seed onto the null space of the Jacobian, then calls `converge`. The
+    search ends if the step is short, does not converge, or leads away from the seed.
+
     Args:
         chain: Joints from the planning frame to the tip.
-        values: Joint values of the group, changed in place [rad or m].
-        seed: Joint values to approach [rad or m].
+        values: Joint values of the group, changed in place, shape (group,) [rad or m].
+        seed: Joint values to approach, shape (group,) [rad or m].
         target: Pose of the tip in the planning frame, shape (3, 4).
         lower: Lower bounds of the group, shape (group,).
         upper: Upper bounds of the group, shape (group,).
@@ -401,9 +406,8 @@ def approach_seed(
         for joint in range(width):
             move = towards_seed[joint] - correction[joint]
             max_change = max(max_change, abs(move))
-            trial[joint] = min(
-                max(values[joint] + move * min(1.0, 0.3 / max(abs(move), 1e-12)), lower[joint]), upper[joint]
-            )
+            move *= min(1.0, MAX_SEED_STEP / max(abs(move), 1e-12))
+            trial[joint] = min(max(values[joint] + move, lower[joint]), upper[joint])
         if max_change < 1.0e-4 or not converge(chain, trial, target, lower, upper, tolerance, 8):
             return
         if np.sum((trial - seed) ** 2) >= np.sum((values - seed) ** 2):
@@ -416,7 +420,7 @@ def unique_rows(rows: Array, is_revolute: NDArray[np.bool_], tolerance: float) -
     """Returns the indices of the rows that differ from all previous rows.
 
     Args:
-        rows: Joint vectors, shape (k, group).
+        rows: Joint vectors, shape (k, group) [rad or m].
         is_revolute: Whether each joint is compared modulo 2 pi, shape (group,).
         tolerance: Maximum joint difference of equal rows [rad or m].
     """
@@ -444,10 +448,10 @@ def unique_rows(rows: Array, is_revolute: NDArray[np.bool_], tolerance: float) -
 
 @njit(cache=True, nogil=True)
 def full_rotations(rows: Array, is_revolute: NDArray[np.bool_], lower: Array, upper: Array, max_count: int) -> Array:
-    """Returns all joint vectors within bounds that differ from a row by full rotations, shape (n, group).
+    """Returns the joint vectors within bounds that differ from a row by full rotations, shape (n, group).
 
     Args:
-        rows: Joint vectors, shape (k, group).
+        rows: Joint vectors, shape (k, group) [rad or m].
         is_revolute: Whether each joint is revolute, shape (group,).
         lower: Lower bounds of the group, shape (group,).
         upper: Upper bounds of the group, shape (group,).
@@ -486,7 +490,7 @@ def full_rotations(rows: Array, is_revolute: NDArray[np.bool_], lower: Array, up
 
 
 def warm_up() -> None:
-    """Compiles the loops called from outside this module or loads them from the cache."""
+    """Compiles the kernels that other modules call, or loads them from the cache."""
     width = 7
     placements = np.tile(np.eye(3, 4), (width, 1, 1))
     placements[:, 2, 3] = 0.1
