@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled checks of states and edges against constraints, and projection of states onto constraints.
 
-A constraint limits a link's pose in a reference frame, by three angles or by regions for a point of the link. A
+A pose constraint limits a link's pose in a reference frame, by three angles or by regions for a point of the link. A
 projection takes Gauss-Newton steps with the geometric Jacobian, as in Berenson, Srinivasa, Ferguson, Kuffner:
 Manipulation planning on constraint manifolds, ICRA 2009.
 """
@@ -18,19 +18,20 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import (
     Tree,
     damped_step,
+    joint_distance,
     joint_placements,
     rotation_vector,
 )
 
 TOLERANCE = 1.0e-6  # accuracy of inverse kinematics, so that a zero-size region stays reachable [m or rad]
-TIGHT_TOLERANCE = 0.005  # projections target the centre of tolerances below this value [m or rad]
+TIGHT_TOLERANCE = 0.005  # projections target the centre of a tolerance up to this value [m or rad]
 INNER_FRACTION = 0.9  # projections target this fraction of a tolerance, because edges deviate between projected states
 HULL_MARGIN = 1.0e-5  # projections target a point at this depth inside a hull [m]
 MAX_STEP = 0.3  # maximum joint displacement in a projection step [rad or m]
-DAMPING = 1.0e-6
+DAMPING = 1.0e-6  # damping of a projection step
 IDENTITY = np.eye(3)
 SAME_STATE_DISTANCE = 1.0e-9  # [rad or m]
-MAX_PROJECTION_STEPS = 8  # iteration limit in a walk, where projections start close to the constraints
+MAX_PROJECTION_STEPS = 8  # maximum steps of a projection in a walk, which starts close to the constraints
 MIN_PROGRESS = 0.1  # minimum progress of a walk step towards the target, as a fraction of its length
 EULER_ANGLES, ROTATION_VECTOR, POINT = range(3)  # quantity types
 BOX, SPHERE, CYLINDER, CONE, HULL = range(5)  # region shapes
@@ -41,14 +42,15 @@ class ConstraintArrays(NamedTuple):
 
     Attributes:
         tree: The n joints that move links or reference frames of pose constraints.
-        ranges: Target, lower and upper tolerance of k joint constraints, shape (k, 3) [rad or m]. The values of these
-            joints follow the values of the tree's joints.
+        ranges: Target, lower and upper tolerance of k joint constraints, shape (k, 3) [rad or m]. In arrays of joint
+            values, these joints follow the tree's joints.
         is_continuous: Whether each of the k joints is continuous, shape (k,).
-        kinds: Compared quantity of m pose constraints, shape (m,).
+        kinds: Quantity that each of m pose constraints limits, shape (m,).
         frames: Tree joints that move the link and the reference frame, -1 for none, shape (m, 2).
         placements: Link and reference frame in the frames of these joints, shape (m, 2, 3, 4). The target rotation is
             included in the reference frame for EULER_ANGLES; its inverse is included in the link for ROTATION_VECTOR.
-        signs: 1 for a joint that moves only the link, -1 for only the reference, otherwise 0, shape (m, n).
+        signs: 1 for a joint that moves only the link, -1 for a joint that moves only the reference frame, otherwise 0;
+            shape (m, n).
         tolerances: Tolerances of the angles, shape (m, 3) [rad].
         regions: First and last (exclusive) region of a POINT, shape (m, 2).
         shapes: Shape of each region, shape (r,).
@@ -114,7 +116,7 @@ def _new_workspace(constraints: ConstraintArrays) -> Workspace:
 
 @njit(cache=True, nogil=True)
 def _place_joints(constraints: ConstraintArrays, mapping: JointMapping, state: Array, workspace: Workspace) -> None:
-    """Computes the placements of the tree's joints."""
+    """Writes the joint values and the placements of the tree's joints to the workspace."""
     drivers, gains, offsets = mapping
     values = workspace.values
     for index in range(len(values)):
@@ -126,20 +128,20 @@ def _place_joints(constraints: ConstraintArrays, mapping: JointMapping, state: A
 
 @njit(cache=True, nogil=True)
 def _joint_excess(constraints: ConstraintArrays, values: Array) -> float:
-    """Returns the maximum violation of the joint constraints."""
+    """Returns the maximum violation of the joint constraints, at most 0 if all are satisfied."""
     ranges, max_excess = constraints.ranges, -np.inf
     first = len(values) - len(ranges)
     for index in range(len(ranges)):
-        gap = values[first + index] - ranges[index, 0]
+        deviation = values[first + index] - ranges[index, 0]
         if constraints.is_continuous[index]:
-            gap = np.arctan2(np.sin(gap), np.cos(gap))
-        max_excess = max(max_excess, gap - ranges[index, 2], -gap - ranges[index, 1])
+            deviation = np.arctan2(np.sin(deviation), np.cos(deviation))
+        max_excess = max(max_excess, deviation - ranges[index, 2], -deviation - ranges[index, 1])
     return max_excess
 
 
 @njit(cache=True, nogil=True)
 def _write_frame(placements: Array, joint: int, placement: Array, out: Array) -> None:
-    """Writes the pose in the planning frame of a frame that a joint moves."""
+    """Writes the planning-frame pose of a frame; `placement` is in the joint's frame, in the planning frame for -1."""
     if joint < 0:
         out[:] = placement
         return
@@ -163,38 +165,38 @@ def _write_relative(reference: Array, pose: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _write_euler(rotation: Array, tolerance: float, out: Array) -> None:
+def _write_euler(rotation: Array, roll_tolerance: float, out: Array) -> None:
     """Writes the intrinsic XYZ Euler angles of a rotation.
 
-    In gimbal lock the rotation counts as roll, or as yaw if it exceeds the roll tolerance.
+    In gimbal lock, the rotation counts as roll, or as yaw if the angle exceeds the roll tolerance.
     """
     sine = min(max(rotation[0, 2], -1.0), 1.0)
     out[1] = np.arcsin(sine)
     if abs(sine) > 1.0 - 1.0e-12:
         out[0], out[2] = np.arctan2(rotation[2, 1], rotation[1, 1]), 0.0
-        if abs(out[0]) > tolerance:
+        if abs(out[0]) > roll_tolerance:
             out[0], out[2] = 0.0, out[0]
     else:
         out[0], out[2] = np.arctan2(-rotation[1, 2], rotation[2, 2]), np.arctan2(-rotation[0, 1], rotation[0, 0])
 
 
 @njit(cache=True, nogil=True)
-def _cone_gap(height: float, radius: float, distance: float, z: float) -> tuple[float, float, float]:
-    """Returns the distance of a point (distance from the axis, z) from a cone, and the nearest point of the cone."""
+def _cone_gap(height: float, radius: float, r: float, z: float) -> tuple[float, float, float]:
+    """Returns the distance of a point (r, z), at the distance r from the axis, from a cone, and the nearest point."""
     half = 0.5 * height
-    if -half <= z <= half and distance * height <= radius * (half - z):
-        return 0.0, distance, z
-    length = radius * radius + height * height
-    fraction = ((radius - distance) * radius + (z + half) * height) / length if length > 0.0 else 0.0
+    if -half <= z <= half and r * height <= radius * (half - z):
+        return 0.0, r, z
+    squared_slant = radius * radius + height * height
+    fraction = ((radius - r) * radius + (z + half) * height) / squared_slant if squared_slant > 0.0 else 0.0
     fraction = min(max(fraction, 0.0), 1.0)
-    side, up, base_distance = radius * (1.0 - fraction), fraction * height - half, min(distance, radius)
-    on_side, on_base = np.hypot(side - distance, up - z), np.hypot(base_distance - distance, half + z)
-    return (on_base, base_distance, -half) if on_base < on_side else (on_side, side, up)
+    side_r, side_z, base_r = radius * (1.0 - fraction), fraction * height - half, min(r, radius)
+    side_gap, base_gap = np.hypot(side_r - r, side_z - z), np.hypot(base_r - r, half + z)
+    return (base_gap, base_r, -half) if base_gap < side_gap else (side_gap, side_r, side_z)
 
 
 @njit(cache=True, nogil=True)
 def _region_gap(shape: int, size: Array, faces: Array, point: Array) -> float:
-    """Returns the distance of a point from a region; for a hull, the distance beyond the most violated face."""
+    """Returns the distance of a point from a region, for a hull from the most violated face; 0 inside."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
         x, y, z = abs(x) - 0.5 * size[0], abs(y) - 0.5 * size[1], abs(z) - 0.5 * size[2]
@@ -212,25 +214,25 @@ def _region_gap(shape: int, size: Array, faces: Array, point: Array) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _write_point(pose: Array, point: Array, out: Array) -> None:
-    """Writes a point of the reference frame in region coordinates."""
-    x, y, z = point[0, 3] - pose[0, 3], point[1, 3] - pose[1, 3], point[2, 3] - pose[2, 3]
+def _write_point(frame: Array, link_pose: Array, out: Array) -> None:
+    """Writes the position of a link in a frame; both poses have the same reference."""
+    x, y, z = link_pose[0, 3] - frame[0, 3], link_pose[1, 3] - frame[1, 3], link_pose[2, 3] - frame[2, 3]
     for row in range(3):
-        out[row] = pose[0, row] * x + pose[1, row] * y + pose[2, row] * z
+        out[row] = frame[0, row] * x + frame[1, row] * y + frame[2, row] * z
 
 
 @njit(cache=True, nogil=True)
-def _pose_excess(constraints: ConstraintArrays, item: int, workspace: Workspace) -> tuple[float, int]:
-    """Writes the deviation of a pose constraint, for the current placements.
+def _pose_excess(constraints: ConstraintArrays, constraint: int, workspace: Workspace) -> tuple[float, int]:
+    """Writes the deviation from a pose constraint to the workspace, for the current placements.
 
     Returns:
-        The violation of the tolerance or region, and the nearest region (-1 for a rotation).
+        The violation of the tolerances, or the distance from the nearest region, and this region (-1 for a rotation).
     """
-    placements, frames, pose = constraints.placements[item], constraints.frames[item], workspace.pose
+    placements, frames, pose = constraints.placements[constraint], constraints.frames[constraint], workspace.pose
     _write_frame(workspace.placements, frames[1], placements[1], workspace.reference)
     _write_frame(workspace.placements, frames[0], placements[0], pose)
     _write_relative(workspace.reference, pose)
-    kind, deviation, tolerances = constraints.kinds[item], workspace.deviation, constraints.tolerances[item]
+    kind, deviation, tolerances = constraints.kinds[constraint], workspace.deviation, constraints.tolerances[constraint]
     if kind != POINT:
         if kind == EULER_ANGLES:
             _write_euler(pose, tolerances[0], deviation)
@@ -241,7 +243,7 @@ def _pose_excess(constraints: ConstraintArrays, item: int, workspace: Workspace)
             max_excess = max(max_excess, abs(deviation[axis]) - tolerances[axis])
         return max_excess, -1
     best, nearest = np.inf, -1
-    for region in range(constraints.regions[item, 0], constraints.regions[item, 1]):
+    for region in range(constraints.regions[constraint, 0], constraints.regions[constraint, 1]):
         _write_point(constraints.poses[region], pose, deviation)
         first_face, end = constraints.face_ranges[region, 0], constraints.face_ranges[region, 1]
         gap = _region_gap(
@@ -258,19 +260,19 @@ def _excess(constraints: ConstraintArrays, mapping: JointMapping, state: Array, 
     """Returns the maximum violation of the constraints, at most 0 if all are satisfied."""
     _place_joints(constraints, mapping, state, workspace)
     max_excess = _joint_excess(constraints, workspace.values)
-    for item in range(len(constraints.kinds)):
-        max_excess = max(max_excess, _pose_excess(constraints, item, workspace)[0])
+    for constraint in range(len(constraints.kinds)):
+        max_excess = max(max_excess, _pose_excess(constraints, constraint, workspace)[0])
     return max_excess
 
 
 @njit(cache=True, nogil=True)
 def first_violated(constraints: ConstraintArrays, mapping: JointMapping, states: Array) -> int:
-    """Returns the index of the first state of (s, joints) that violates a constraint, or -1.
+    """Returns the index of the first state that violates a constraint, or -1.
 
     Args:
         constraints: Constraints as arrays.
         mapping: Mapping of the states to the joints of the constraints.
-        states: States, shape (s, joints).
+        states: States, shape (s, joints) [rad or m].
     """
     workspace = _new_workspace(constraints)
     for index in range(len(states)):
@@ -289,7 +291,7 @@ def _edge_satisfied(
     state: Array,
     workspace: Workspace,
 ) -> bool:
-    """Checks the constraints along an edge except at its start, beginning with its end and its middle."""
+    """Returns whether an edge satisfies the constraints, except at its start; checks samples from coarse to fine."""
     max_change = 0.0
     for joint in range(len(start)):
         max_change = max(max_change, abs(end[joint] - start[joint]))
@@ -311,12 +313,12 @@ def _edge_satisfied(
 
 @njit(cache=True, nogil=True)
 def edges_satisfied(constraints: ConstraintArrays, mapping: JointMapping, vertices: Array, step: float) -> bool:
-    """Checks the constraints along a polyline except at its start.
+    """Returns whether a polyline satisfies the constraints, except at its start.
 
     Args:
         constraints: Constraints as arrays.
         mapping: Mapping of the states to the joints of the constraints.
-        vertices: States of the polyline, shape (s, joints).
+        vertices: States of the polyline, shape (s, joints) [rad or m].
         step: Maximum joint displacement between checked states [rad or m].
     """
     workspace, state = _new_workspace(constraints), np.empty(vertices.shape[1])
@@ -328,26 +330,29 @@ def edges_satisfied(constraints: ConstraintArrays, mapping: JointMapping, vertic
 
 @njit(cache=True, nogil=True)
 def _angle_rows(
-    kind: int, deviation: Array, tolerances: Array, violated: bool, directions: Array, changes: Array
+    kind: int, deviation: Array, tolerances: Array, is_violated: bool, directions: Array, changes: Array
 ) -> int:
-    """Writes the gradients of the angles to change over a rotation of the link, and the required changes."""
+    """Writes the rows of violated and tight angles; returns the number of rows.
+
+    A row consists of the derivatives of an angle by a rotation vector in the reference frame, and the required change.
+    """
     x, y, z = deviation[0], deviation[1], deviation[2]
     count = 0
     for axis in range(3):
         limit = 0.0 if tolerances[axis] <= TIGHT_TOLERANCE else INNER_FRACTION * tolerances[axis]
-        if not (limit == 0.0 or (violated and abs(deviation[axis]) > limit)):
+        if not (limit == 0.0 or (is_violated and abs(deviation[axis]) > limit)):
             continue
         row = directions[count]
         if kind == EULER_ANGLES:
-            sine, cosine, rise = np.sin(x), np.cos(x), np.cos(y)
-            rise = max(abs(rise), 1.0e-3) * (1.0 if rise >= 0.0 else -1.0)
+            sine, cosine, divisor = np.sin(x), np.cos(x), np.cos(y)
+            divisor = max(abs(divisor), 1.0e-3) * (1.0 if divisor >= 0.0 else -1.0)
             if axis == 0:
-                tangent = np.sin(y) / rise
+                tangent = np.sin(y) / divisor
                 row[0], row[1], row[2] = 1.0, sine * tangent, -cosine * tangent
             elif axis == 1:
                 row[0], row[1], row[2] = 0.0, cosine, sine
             else:
-                row[0], row[1], row[2] = 0.0, -sine / rise, cosine / rise
+                row[0], row[1], row[2] = 0.0, -sine / divisor, cosine / divisor
         else:  # row of the inverse left Jacobian of SO(3): 1 - [v] / 2 + s [v]^2, with [v]^2 = v v^T - |v|^2
             squared_angle = x * x + y * y + z * z
             angle = np.sqrt(squared_angle)
@@ -366,24 +371,25 @@ def _angle_rows(
 
 
 @njit(cache=True, nogil=True)
-def _inner_limit(length: float) -> float:
-    """Returns the half length within a region that projections aim at."""
-    return 0.0 if length <= TIGHT_TOLERANCE else length - min((1.0 - INNER_FRACTION) * length, TIGHT_TOLERANCE)
+def _inner_limit(half: float) -> float:
+    """Returns the half length that projections target in a region with the given half length."""
+    return 0.0 if half <= TIGHT_TOLERANCE else half - min((1.0 - INNER_FRACTION) * half, TIGHT_TOLERANCE)
 
 
 @njit(cache=True, nogil=True)
 def _add_row(x: float, y: float, z: float, change: float, count: int, directions: Array, changes: Array) -> int:
+    """Adds the row that moves a point by `change` along (x, y, z); returns the new number of rows."""
     directions[count, 0], directions[count, 1], directions[count, 2], changes[count] = x, y, z, change
     return count + 1
 
 
 @njit(cache=True, nogil=True)
 def _axis_row(
-    axis: int, half: float, point: Array, violated: bool, count: int, directions: Array, changes: Array
+    axis: int, half: float, point: Array, is_violated: bool, count: int, directions: Array, changes: Array
 ) -> int:
     """Adds the row that keeps a coordinate between -half and half; returns the new number of rows."""
     limit, value = _inner_limit(half), point[axis]
-    if limit > 0.0 and (not violated or abs(value) <= limit):
+    if limit > 0.0 and (not is_violated or abs(value) <= limit):
         return count
     change = min(max(value, -limit), limit) - value
     return _add_row(1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2), change, count, directions, changes)
@@ -391,56 +397,57 @@ def _axis_row(
 
 @njit(cache=True, nogil=True)
 def _region_rows(
-    shape: int, size: Array, faces: Array, point: Array, violated: bool, directions: Array, changes: Array
+    shape: int, size: Array, faces: Array, point: Array, is_violated: bool, directions: Array, changes: Array
 ) -> int:
-    """Writes the directions in the frame of a region in which a point must move, and the distances."""
+    """Writes directions in which a point must move, in a region's frame, and the distances; returns their number."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
         count = 0
         for axis in range(3):
-            count = _axis_row(axis, 0.5 * size[axis], point, violated, count, directions, changes)
+            count = _axis_row(axis, 0.5 * size[axis], point, is_violated, count, directions, changes)
         return count
     if shape == HULL:
         count = 0
         for face in range(len(faces)):
             a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
             gap = a * x + b * y + c * z + faces[face, 3] + HULL_MARGIN
-            if violated and gap > 0.0:
+            if is_violated and gap > 0.0:
                 count = _add_row(a, b, c, -gap, count, directions, changes)
         return count
     if shape == CONE:
-        if not violated:
+        if not is_violated:
             return 0
-        distance = max(np.hypot(x, y), 1.0e-12)
-        _, inside, up = _cone_gap(size[0], size[1], distance, z)
-        fraction = INNER_FRACTION * inside / distance
+        r = max(np.hypot(x, y), 1.0e-12)
+        _, nearest_r, nearest_z = _cone_gap(size[0], size[1], r, z)
+        fraction = INNER_FRACTION * nearest_r / r
         count = _add_row(1.0, 0.0, 0.0, fraction * x - x, 0, directions, changes)
         count = _add_row(0.0, 1.0, 0.0, fraction * y - y, count, directions, changes)
-        return _add_row(0.0, 0.0, 1.0, INNER_FRACTION * up - z, count, directions, changes)
+        return _add_row(0.0, 0.0, 1.0, INNER_FRACTION * nearest_z - z, count, directions, changes)
     is_cylinder = shape == CYLINDER
-    count = _axis_row(2, 0.5 * size[0], point, violated, 0, directions, changes) if is_cylinder else 0
+    count = _axis_row(2, 0.5 * size[0], point, is_violated, 0, directions, changes) if is_cylinder else 0
     radius, height = size[1] if is_cylinder else size[0], 0.0 if is_cylinder else z
     limit, distance = _inner_limit(radius), np.sqrt(x * x + y * y + height * height)
     if limit == 0.0:
         for axis in range(2 if is_cylinder else 3):
-            count = _axis_row(axis, 0.0, point, violated, count, directions, changes)
-    elif violated and distance > limit:
+            count = _axis_row(axis, 0.0, point, is_violated, count, directions, changes)
+    elif is_violated and distance > limit:
         count = _add_row(x / distance, y / distance, height / distance, limit - distance, count, directions, changes)
     return count
 
 
 @njit(cache=True, nogil=True)
-def _pose_rows(constraints: ConstraintArrays, item: int, region: int, violated: bool, workspace: Workspace) -> int:
+def _pose_rows(
+    constraints: ConstraintArrays, constraint: int, region: int, is_violated: bool, workspace: Workspace
+) -> int:
     """Writes the linearised rows of a pose constraint in the reference frame; returns the number of rows."""
     directions, changes = workspace.directions, workspace.changes
     if region < 0:
-        return _angle_rows(
-            constraints.kinds[item], workspace.deviation, constraints.tolerances[item], violated, directions, changes
-        )
+        kind, tolerances = constraints.kinds[constraint], constraints.tolerances[constraint]
+        return _angle_rows(kind, workspace.deviation, tolerances, is_violated, directions, changes)
     first_face, end = constraints.face_ranges[region, 0], constraints.face_ranges[region, 1]
     shape, size, pose = constraints.shapes[region], constraints.sizes[region], constraints.poses[region]
     count = _region_rows(
-        shape, size, constraints.faces[first_face:end], workspace.deviation, violated, directions, changes
+        shape, size, constraints.faces[first_face:end], workspace.deviation, is_violated, directions, changes
     )
     for row in range(count):
         x, y, z = directions[row, 0], directions[row, 1], directions[row, 2]
@@ -453,17 +460,17 @@ def _pose_rows(constraints: ConstraintArrays, item: int, region: int, violated: 
 def _add_gradients(
     constraints: ConstraintArrays,
     mapping: JointMapping,
-    item: int,
+    constraint: int,
     count: int,
     first: int,
     workspace: Workspace,
     jacobian: Array,
     targets: Array,
 ) -> None:
-    """Writes the Jacobian rows and the target changes of a pose constraint."""
-    tree, signs, reference, pose = constraints.tree, constraints.signs[item], workspace.reference, workspace.pose
-    is_rotation = constraints.kinds[item] != POINT
-    px, py, pz = reference[0, 3], reference[1, 3], reference[2, 3]  # the point in the planning frame
+    """Writes the Jacobian rows `first` to `first + count` and the target changes of a pose constraint."""
+    tree, signs, reference, pose = constraints.tree, constraints.signs[constraint], workspace.reference, workspace.pose
+    is_rotation = constraints.kinds[constraint] != POINT
+    px, py, pz = reference[0, 3], reference[1, 3], reference[2, 3]  # origin of the link in the planning frame
     for column in range(3):
         px += reference[0, column] * pose[column, 3]
         py += reference[1, column] * pose[column, 3]
@@ -493,10 +500,10 @@ def _add_gradients(
 
 @njit(cache=True, nogil=True)
 def _write_step(
-    jacobian: Array, targets: Array, count: int, free: NDArray[np.bool_], gram: Array, solution: Array, step: Array
+    jacobian: Array, targets: Array, count: int, free: NDArray[np.bool_], factor: Array, solution: Array, step: Array
 ) -> None:
     """Writes the least-squares step of the free joints, scaled to at most MAX_STEP per joint."""
-    damped_step(jacobian, targets, count, DAMPING, free, step, gram, solution)
+    damped_step(jacobian, targets, count, DAMPING, free, step, factor, solution)
     max_change = 1.0e-12
     for joint in range(len(step)):
         max_change = max(max_change, abs(step[joint]))
@@ -509,60 +516,53 @@ def _write_step(
 def project(
     constraints: ConstraintArrays, mapping: JointMapping, state: Array, lower: Array, upper: Array, steps: int
 ) -> bool:
-    """Moves a state by least-squares steps within bounds until all constraints hold.
+    """Moves a state by least-squares steps within bounds until all pose constraints hold.
 
-    Joints at a bound stay fixed if the step would violate the bound; the step is then computed for the other joints.
+    A joint at a bound stays fixed if the step would violate the bound; the step is then computed again. Joint
+    constraints do not affect the steps and are checked at the end.
 
     Args:
         constraints: Constraints as arrays.
         mapping: Mapping of the state to the joints of the constraints.
-        state: Joint vector, shape (joints,); changed in place.
+        state: Joint vector, changed in place, shape (joints,) [rad or m].
         lower: Lower bounds, shape (joints,).
         upper: Upper bounds, shape (joints,).
         steps: Maximum number of steps.
 
     Returns:
-        Whether all constraints hold.
+        Whether all pose and joint constraints hold.
     """
     width, max_rows = len(state), 3 * len(constraints.kinds) + len(constraints.faces)
     workspace = _new_workspace(constraints)
-    jacobian, targets, gram = np.empty((max_rows, width)), np.empty(max_rows), np.empty((max_rows, max_rows))
+    jacobian, targets, factor = np.empty((max_rows, width)), np.empty(max_rows), np.empty((max_rows, max_rows))
     solution, step, free = np.empty(max_rows), np.empty(width), np.empty(width, dtype=np.bool_)
     for joint in range(width):
         state[joint] = min(max(state[joint], lower[joint]), upper[joint])
     for _ in range(steps):
         _place_joints(constraints, mapping, state, workspace)
         count, is_violated = 0, False
-        for item in range(len(constraints.kinds)):
-            excess, region = _pose_excess(constraints, item, workspace)
-            rows = _pose_rows(constraints, item, region, excess > TOLERANCE, workspace)
-            _add_gradients(constraints, mapping, item, rows, count, workspace, jacobian, targets)
+        for constraint in range(len(constraints.kinds)):
+            excess, region = _pose_excess(constraints, constraint, workspace)
+            rows = _pose_rows(constraints, constraint, region, excess > TOLERANCE, workspace)
+            _add_gradients(constraints, mapping, constraint, rows, count, workspace, jacobian, targets)
             count, is_violated = count + rows, is_violated or excess > TOLERANCE
         if not is_violated:
             return _joint_excess(constraints, workspace.values) <= TOLERANCE
         free[:] = True
         for _attempt in range(3):
-            _write_step(jacobian, targets, count, free, gram, solution, step)
-            blocked = False
+            _write_step(jacobian, targets, count, free, factor, solution, step)
+            is_blocked = False
             for joint in range(width):
-                at_end = (state[joint] <= lower[joint] and step[joint] < 0.0) or (
-                    state[joint] >= upper[joint] and step[joint] > 0.0
-                )
-                if free[joint] and at_end:
-                    free[joint], blocked = False, True
-            if not blocked:
+                if free[joint] and (
+                    (state[joint] <= lower[joint] and step[joint] < 0.0)
+                    or (state[joint] >= upper[joint] and step[joint] > 0.0)
+                ):
+                    free[joint], is_blocked = False, True
+            if not is_blocked:
                 break
         for joint in range(width):
             state[joint] = min(max(state[joint] + step[joint], lower[joint]), upper[joint])
     return False
-
-
-@njit(cache=True, nogil=True)
-def _distance(first: Array, second: Array) -> float:
-    squared_distance = 0.0
-    for joint in range(len(first)):
-        squared_distance += (second[joint] - first[joint]) * (second[joint] - first[joint])
-    return np.sqrt(squared_distance)
 
 
 @njit(cache=True, nogil=True)
@@ -580,7 +580,7 @@ def walk(
 ) -> int:
     """Walks from a state towards a target along the constraints, by straight steps and projections.
 
-    A step is halved if the constraints are violated along it, and doubled after a successful step.
+    The step length is halved after a failed step and doubled after a successful step.
 
     Args:
         constraints: Constraints as arrays, satisfied at the start.
@@ -589,22 +589,22 @@ def walk(
         target: Target state, shape (joints,).
         lower: Lower bounds of projected states, shape (joints,).
         upper: Upper bounds of projected states, shape (joints,).
-        max_step: Maximum length of a step before projection.
-        min_step: Minimum length of a step.
-        step: Maximum joint displacement between checked states.
-        out: Output states, shape (capacity, joints).
+        max_step: Maximum length of a step before projection [rad or m].
+        min_step: Minimum length of a step [rad or m].
+        step: Maximum joint displacement between checked states [rad or m].
+        out: Written states, shape (capacity, joints) [rad or m].
 
     Returns:
-        Number of output states. The walk ends exactly at the target, or if no step leads closer to the target, or if
-        the output is full.
+        Number of written states. The walk ends exactly at the target, at a state from which no step leads closer to the
+        target, or when `out` is full.
     """
     workspace, state, sampled = _new_workspace(constraints), np.empty(len(start)), np.empty(len(start))
-    current, size, count = start.copy(), max_step, 0
+    current, step_length, count = start.copy(), max_step, 0
     while count < len(out):
-        distance = _distance(current, target)
+        distance = joint_distance(current, target)
         if distance < SAME_STATE_DISTANCE:
             break
-        length = min(size, distance)
+        length = min(step_length, distance)
         for joint in range(len(state)):
             state[joint] = target[joint]
             if length < distance:
@@ -614,15 +614,15 @@ def walk(
         )
         is_nearer = (
             is_nearer
-            and _distance(state, target) <= distance - MIN_PROGRESS * length
-            and _distance(current, state) <= 2.0 * length
+            and joint_distance(state, target) <= distance - MIN_PROGRESS * length
+            and joint_distance(current, state) <= 2.0 * length
         )
         if is_nearer and _edge_satisfied(constraints, mapping, current, state, step, sampled, workspace):
             current[:] = state
             out[count] = state
-            count, size = count + 1, min(max_step, 2.0 * size)
+            count, step_length = count + 1, min(max_step, 2.0 * step_length)
             continue
-        size = 0.5 * length
-        if size < (min_step if is_nearer else max(min_step, 0.25 * max_step)):
+        step_length = 0.5 * length
+        if step_length < (min_step if is_nearer else max(min_step, 0.25 * max_step)):
             break
     return count
