@@ -178,8 +178,8 @@ def test_a_body_moves_no_farther_than_the_bound_and_the_bound_of_a_straight_moti
         middle = rng.uniform(-2.0, 2.0, len(small.joint_names))
         change = rng.uniform(-1.0, 1.0, len(middle)) * rng.choice([0.01, 0.1, 0.5])
         samples = compiled_paths.sample(np.array([middle - change, middle + change]), 1.0e-3)
-        stretch = compiled_paths.new_workspace(world).stretch
-        compiled_paths.evaluate_middle(world, samples, 0, int(samples.at_vertices[-1]), True, stretch)
+        section = compiled_paths.new_workspace(world).section
+        compiled_paths.evaluate_middle(world, samples, 0, int(samples.vertex_samples[-1]), True, section)
         for body in np.flatnonzero(world.joints >= 0):
             joint = int(world.joints[body]) + 1
             x, y, z, radius = world.spheres[body]
@@ -191,8 +191,8 @@ def test_a_body_moves_no_farther_than_the_bound_and_the_bound_of_a_straight_moti
                 pin.forwardKinematics(small.pin_model, data, middle + share * change)
                 places.append(local @ data.oMi[joint].rotation.T + data.oMi[joint].translation)
             moved = np.linalg.norm(np.array(places) - places[4], axis=2).max()
-            assert moved <= stretch.motions[body] + 1e-12
-            shares.append(moved / stretch.motions[body])
+            assert moved <= section.body_motions[body] + 1e-12
+            shares.append(moved / section.body_motions[body])
     assert np.median(shares) > 0.5
 
 

@@ -143,39 +143,41 @@ class ExactCollisionChecker:
     def colliding_state(self, vertices: Array, step: float) -> Array | None:
         """Returns a colliding state among the samples of `path_is_free`, or None."""
         path = np.ascontiguousarray(vertices, dtype=float)
-        index, at_vertices = self._colliding_sample(path, step, 0)
-        return sample_at(path, at_vertices, index) if index >= 0 else None
+        index, vertex_samples = self._colliding_sample(path, step, 0)
+        return sample_at(path, vertex_samples, index) if index >= 0 else None
 
     def _colliding_sample(self, path: Array, step: float, first: int) -> tuple[int, NDArray[np.int64]]:
         """Returns the index of a colliding sample or -1, and the sample index of each vertex; see `path_is_free`."""
-        status, count, at_vertices = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+        status, count, vertex_samples = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         decided = 0
         while status == TOO_CLOSE:
             written = min(count, len(self._undecided))
-            index = self._decide(path, at_vertices, self._undecided[decided:written])
+            index = self._decide(path, vertex_samples, self._undecided[decided:written])
             if index >= 0:
-                return index, at_vertices
+                return index, vertex_samples
             if written == count:
                 break
             decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
             self.check_counts[REQUESTED] -= 1  # the check was already counted
-            status, count, at_vertices = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+            status, count, vertex_samples = check_polyline(
+                path, step, first, self._undecided, *self._compiled.arguments
+            )
         if status == TOUCHING:
-            return count, at_vertices
-        end = int(at_vertices[-1])
+            return count, vertex_samples
+        end = int(vertex_samples[-1])
         if self._tolerated or self._compiled.uncompiled:
             self.check_counts[FOUND_FREE] -= status != TOO_CLOSE  # pairs without bounds are still unchecked
             for index in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
-                if not self._unbounded_pairs_are_free(sample_at(path, at_vertices, index)):
+                if not self._unbounded_pairs_are_free(sample_at(path, vertex_samples, index)):
                     self.check_counts[EXACTLY_TOUCHING] += 1
-                    return index, at_vertices
-        return -1, at_vertices
+                    return index, vertex_samples
+        return -1, vertex_samples
 
-    def _decide(self, path: Array, at_vertices: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
+    def _decide(self, path: Array, vertex_samples: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
         """Runs the exact check on undecided pairs and returns the index of a touching sample, or -1."""
         for index, pair in undecided.tolist():
             members = {int(self._moving[member]): member for member in self._compiled.members[pair]}
-            touching = self._exact.touching_pair(sample_at(path, at_vertices, index), members)
+            touching = self._exact.touching_pair(sample_at(path, vertex_samples, index), members)
             if touching >= 0:
                 self.check_counts[EXACTLY_TOUCHING] += 1
                 self._compiled.world.refusals[self._compiled.members.row_of(members[touching])] += 1

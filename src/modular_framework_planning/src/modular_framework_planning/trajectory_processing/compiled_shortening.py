@@ -286,8 +286,7 @@ def shorten_in(
     status = _shorten_in(
         borrowed(shortening), borrowed(edges), edge_memory, verdict, bodies, borrowed(edge), borrowed(workspace)
     )
-    release(workspace)
-    edge.at_vertices[0] = 0
+    release(workspace, edge)
     return status
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Body poses and pair distances of a robot and its environment, compiled."""
+"""Body poses of a robot and its environment, and distances of body pairs, compiled."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     ROUNDING,
     SURFACE,
     Memory,
-    Solid,
+    relative_pose,
     solid_distance,
+    solid_of,
     surface_to_solid,
     surface_to_surface,
 )
@@ -29,18 +30,19 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
 TABLE_CELLS = 128  # table cells along each joint, over one revolution
-# requested checks, checks found free, found touching; evaluated states; checks that Coal found touching
+# Indices into World.counts: requested checks, checks found free or touching, evaluated states, and checks that Coal
+# found touching
 CHECK_COUNTS = 5
 REQUESTED, FOUND_FREE, FOUND_TOUCHING, EVALUATED_STATES, EXACTLY_TOUCHING = range(CHECK_COUNTS)
 FIELD = -1  # second body of a pair with all solids of the distance field
-UNKNOWN, APART, NEAR = range(3)
+UNKNOWN, APART, NEAR = range(3)  # verdicts of table cells
 
 
 class World(NamedTuple):
-    """Bodies of a robot and its environment, and the pairs to watch.
+    """Bodies of a robot and its environment, and the pairs to check.
 
-    A field pair has FIELD as its second body. Field pairs come last and each represents the pairs of one body with all
-    solids of the distance field.
+    Field pairs come last and have FIELD as their second body. A field pair represents the pairs of its first body with
+    all solids of the distance field.
 
     Attributes:
         tree: Joints of the robot.
@@ -51,19 +53,20 @@ class World(NamedTuple):
         kinds: Closed form of each body, SURFACE for none; shape (b,).
         sizes: Three parameters of each closed form, shape (b, 3).
         spheres: Bounding sphere of each body, centre (in the body's frame) and radius; shape (b, 4).
-        closed: Whether each body's surface has an inside, shape (b,).
+        closed: Whether each body's surface is closed, shape (b,).
         robot: Surfaces of the links.
         scene: Surfaces of the world, of held objects and of links in closed form.
-        pairs: Two bodies per pair, the first with a surface; shape (p, 2).
+        pairs: Two bodies of each pair, the first with a surface; shape (p, 2).
         margins: Minimum distance of each pair, shape (p,) [m].
-        excess: Maximum distance of a pair's bounding geometries outside the bodies, inf if unknown; shape (p,) [m].
-        tables: Verdicts UNKNOWN, APART (in the whole cell) or NEAR for pairs of links separated by one or two joints;
-            filled on first use, shape (t, TABLE_CELLS, TABLE_CELLS).
+        excess: Maximum distance by which the bounding geometries of each pair lie outside the bodies, inf if unknown;
+            shape (p,) [m].
+        tables: Verdicts UNKNOWN, APART (in the whole cell) or NEAR for pairs of links separated by one or two revolute
+            joints; filled on first use, shape (t, TABLE_CELLS, TABLE_CELLS).
         table_joints: Joints of each table, the joint nearer to the base first, -1 for none; shape (t, 2).
         table_of: Table of each pair, -1 for none; shape (p,).
         watched: Pairs to check; pairs that a field pair represents are left out.
         represented: Pairs that each field pair represents, in the order of the field's solids; shape (f, n).
-        counts: Counters, see CHECK_COUNTS; undecided checks that are repeated elsewhere are left out.
+        counts: Counters, see CHECK_COUNTS; a check that an exact check repeats is counted once.
         refusals: Number of checks in which each pair touched; field pairs count for the represented pair; shape (p,).
         common_joints: Last joint that moves both bodies of each pair, -1 for none; shape (p,).
         field: Distance field over solids of the world.
@@ -103,7 +106,7 @@ def place_bodies(world: World, placements: Array, out: Array, centres: Array, wi
         placements: Pose of each joint, shape (joints, 3, 4).
         out: Written pose of each body, shape (b, 3, 4).
         centres: Written centre of each body's bounding sphere, shape (b, 3) [m].
-        with_world: Whether bodies of the world are written.
+        with_world: Whether the bodies of the world are also placed.
     """
     local, spheres = world.poses, world.spheres
     for body in range(len(world.joints)):
@@ -130,49 +133,16 @@ def place_bodies(world: World, placements: Array, out: Array, centres: Array, wi
 
 
 @njit(cache=True, nogil=True)
-def relative_pose(one: Array, two: Array, relative: Array) -> None:
-    """Writes the first pose in the frame of the second.
-
-    Args:
-        one: First pose, shape (3, 4).
-        two: Second pose, shape (3, 4).
-        relative: Result, shape (3, 4).
-    """
-    for row in range(3):
-        for column in range(4):
-            value = 0.0
-            for inner in range(3):
-                part = one[inner, column] - (two[inner, 3] if column == 3 else 0.0)
-                value += two[inner, row] * part
-            relative[row, column] = value
-
-
-@njit(cache=True, nogil=True)
-def solid_of(kinds: NDArray[np.int64], sizes: Array, body: int) -> Solid:
-    """Returns the closed form of a body.
-
-    Args:
-        kinds: Kind of each body, as in World.
-        sizes: Sizes of each body, as in World.
-        body: Index of the body.
-    """
-    return Solid(kinds[body], sizes[body, 0], sizes[body, 1], sizes[body, 2])
-
-
-@njit(cache=True, nogil=True)
 def centre_distance(centres: Array, first: int, second: int) -> float:
-    """Returns the distance between two centres [m].
+    """Returns the distance between the centres of two bodies [m].
 
     Args:
-        centres: Centres of the bounding spheres, shape (b, 3) [m].
-        first: Index of one centre.
-        second: Index of the other centre.
+        centres: Centre of each body's bounding sphere, shape (b, 3) [m].
+        first: Index of the first body.
+        second: Index of the second body.
     """
-    x, y, z = (
-        centres[first, 0] - centres[second, 0],
-        centres[first, 1] - centres[second, 1],
-        centres[first, 2] - centres[second, 2],
-    )
+    x, y = centres[first, 0] - centres[second, 0], centres[first, 1] - centres[second, 1]
+    z = centres[first, 2] - centres[second, 2]
     return np.sqrt(x * x + y * y + z * z)
 
 
@@ -180,7 +150,7 @@ def centre_distance(centres: Array, first: int, second: int) -> float:
 def pair_bound(
     world: World, pair: int, poses: Array, centres: Array, limit: float, memory: Memory
 ) -> tuple[int, float]:
-    """Bounds the distance of a pair minus the pair's margin.
+    """Returns a lower bound of a pair's distance minus its margin.
 
     Args:
         world: Bodies and pairs.
@@ -191,7 +161,7 @@ def pair_bound(
         memory: Working memory.
 
     Returns:
-        The status and the lower bound [m]. For a touching field pair, the index of a touched solid replaces the bound.
+        The status and a lower bound [m]. For a touching field pair, the index of a touched solid replaces the bound.
     """
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin, excess = world.margins[pair], world.excess[pair]
@@ -212,7 +182,7 @@ def pair_bound(
 
 @njit(cache=True, nogil=True)
 def _contains(world: World, outer: int, inner: int, poses: Array) -> bool:
-    """Returns whether the outer body surrounds a point of the inner body; valid if their surfaces do not touch."""
+    """Returns whether a point of the inner body lies inside the outer body; valid if their surfaces do not touch."""
     if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
     point = np.zeros(3)  # centre of a closed form, because a surface may be larger than the body
@@ -222,19 +192,14 @@ def _contains(world: World, outer: int, inner: int, poses: Array) -> bool:
         while surface.children[node, 0] >= 0:
             node = surface.children[node, 0]
         point = surface.triangles[surface.children[node, 1]][:3]
-    one, two = poses[inner], poses[outer]
+    inner_pose, outer_pose = poses[inner], poses[outer]
     local = np.empty(3)
     for row in range(3):
         local[row] = 0.0
         for axis in range(3):
-            value = (
-                one[axis, 0] * point[0]
-                + one[axis, 1] * point[1]
-                + one[axis, 2] * point[2]
-                + one[axis, 3]
-                - two[axis, 3]
-            )
-            local[row] += two[axis, row] * value
+            pose = inner_pose[axis]
+            value = pose[0] * point[0] + pose[1] * point[1] + pose[2] * point[2] + pose[3] - outer_pose[axis, 3]
+            local[row] += outer_pose[axis, row] * value
     if world.kinds[outer] != SURFACE:
         solid = solid_of(world.kinds, world.sizes, outer)
         return solid_distance(solid, local[0], local[1], local[2]) < -ROUNDING
@@ -268,13 +233,13 @@ def surrounded_pair(world: World, poses: Array, centres: Array) -> int:
 
 
 def arguments(world: World) -> tuple[NDArray[Any], ...]:
-    """Returns the arrays of a world as separate arguments; numba dispatches them in 4 us, a World in 70 us."""
+    """Returns the arrays of a world as separate arguments, which numba dispatches in 4 us instead of 70 us."""
     return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-1], *world.field)
 
 
 @njit(cache=True, nogil=True)
 def world_of(arrays: tuple[NDArray[Any], ...]) -> World:
-    """Rebuilds a World, without array owners, from the result of `arguments`."""
+    """Rebuilds a World of borrowed arrays from the result of `arguments`."""
     a = borrowed(arrays)
     # numba supports only one starred argument per call
     tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
@@ -285,7 +250,7 @@ def world_of(arrays: tuple[NDArray[Any], ...]) -> World:
 
 @njit(cache=True, nogil=True)
 def surrounded_pair_at(positions: Array, *world: NDArray[Any]) -> int:
-    """Returns the first pair with one body inside the other at these joint positions, or -1."""
+    """Returns the `surrounded_pair` at joint positions of the whole robot, shape (joints,) [rad or m]."""
     return _surrounded_at(world_of(world), positions)
 
 

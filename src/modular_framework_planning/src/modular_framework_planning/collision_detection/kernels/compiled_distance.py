@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lower bounds of the distance between two bodies, compiled: coarse for distant bodies, within 0.1 mm for close bodies.
 
-A body is a sphere tree over triangles, or a solid with a closed-form distance to a point. Every result is a lower
-bound of the true distance; for a bound of 0, the status shows whether the bodies touch or are too close to decide.
+A body is a sphere tree over triangles, or a solid with a closed-form distance to a point. For a bound of 0, the status
+tells whether the bodies touch or are too close to decide.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
 from modular_framework_planning.geometry.spatial import Array
 
 SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # closed forms; SURFACE: none
-CLEAR, TOUCHING, TOO_CLOSE = range(3)
+CLEAR, TOUCHING, TOO_CLOSE = range(3)  # statuses
 
 MIN_PIECE_RADIUS_M = 1.0e-4  # triangles are split down to this radius before a pair counts as undecided
-ROUNDING = 1.0e-6  # [m]; tolerance for the exact checker and for floating point
-MIN_USEFUL_FRACTION = 0.3  # bounds below this fraction of the required distance are not worth refining
+ROUNDING = 1.0e-6  # tolerance of the exact checker and of floating-point arithmetic [m]
+MIN_USEFUL_FRACTION = 0.3  # below this fraction of the required distance, only contact is decided
 MAX_RADIUS_FRACTION = 0.5  # a sphere is not subdivided if its radius is at most this fraction of its distance
-MAX_PIECES = 4000
+MAX_PIECES = 4000  # pieces of a triangle visited before a pair counts as undecided
 MAX_NODE_PAIRS = 50_000  # node pairs visited per table cell
 STACK_SIZE = 512
 
@@ -59,7 +59,7 @@ class Memory(NamedTuple):
     """Working memory of a check.
 
     Attributes:
-        relative: A pose, shape (3, 4).
+        relative: Pose of the first body in the frame of the second, shape (3, 4).
         stack: Node pairs to visit, shape (STACK_SIZE, 2).
         bounds: Distance bound of each node pair, shape (STACK_SIZE,) [m].
         pieces: Pieces of a triangle, shape (64, 9) [m].
@@ -81,11 +81,41 @@ def new_memory() -> Memory:
 
 
 @njit(cache=True, nogil=True)
-def solid_distance(solid: Solid, x: float, y: float, z: float) -> float:
-    """Returns the distance of a point from a solid, or a lower bound [m]; negative inside the solid.
+def solid_of(kinds: NDArray[np.int64], sizes: Array, body: int) -> Solid:
+    """Returns the closed form of a body.
 
-    The solid's parameters p0, p1, p2 are the half extents of a box, the radius and half height of a cylinder, cone or
-    capsule, the radius of a sphere, or the unit normal of a plane or half space.
+    Args:
+        kinds: Kind of each closed form, shape (b,).
+        sizes: Parameters of each closed form, shape (b, 3).
+        body: Index of the body.
+    """
+    return Solid(kinds[body], sizes[body, 0], sizes[body, 1], sizes[body, 2])
+
+
+@njit(cache=True, nogil=True)
+def relative_pose(pose: Array, reference: Array, out: Array) -> None:
+    """Writes a pose in the frame of a reference pose.
+
+    Args:
+        pose: Pose, shape (3, 4).
+        reference: Reference pose in the same frame, shape (3, 4).
+        out: Written pose, shape (3, 4).
+    """
+    for row in range(3):
+        for column in range(4):
+            value = 0.0
+            for inner in range(3):
+                part = pose[inner, column] - (reference[inner, 3] if column == 3 else 0.0)
+                value += reference[inner, row] * part
+            out[row, column] = value
+
+
+@njit(cache=True, nogil=True)
+def solid_distance(solid: Solid, x: float, y: float, z: float) -> float:
+    """Returns the signed distance of a point from a solid [m], negative inside; a plane has no inside.
+
+    The parameters p0, p1, p2 of the solid are the half extents of a box, the radius and half height of a cylinder, cone
+    or capsule, the radius of a sphere, or the unit normal of a plane or half space.
 
     Args:
         solid: Closed form.
@@ -117,12 +147,12 @@ def solid_distance(solid: Solid, x: float, y: float, z: float) -> float:
 
 @njit(cache=True, nogil=True)
 def placed_solid_distance(solid: Solid, poses: Array, body: int, x: float, y: float, z: float) -> float:
-    """Returns the solid_distance of a point in the planning frame.
+    """Returns the signed distance of a point from a placed solid [m].
 
     Args:
         solid: Closed form.
         poses: Pose of each body in the planning frame, shape (b, 3, 4).
-        body: Body of the solid.
+        body: Index of the solid's body.
         x: Coordinate of the point in the planning frame [m].
         y: Coordinate of the point in the planning frame [m].
         z: Coordinate of the point in the planning frame [m].
@@ -138,7 +168,7 @@ def placed_solid_distance(solid: Solid, poses: Array, body: int, x: float, y: fl
 
 @njit(cache=True, nogil=True)
 def _cone_distance(radius: float, half: float, r: float, z: float) -> float:
-    """Returns the distance of (r, z) from the triangle (0, -half), (radius, -half), (0, half) in the half plane."""
+    """Returns the signed distance of (r, z), r >= 0, from the triangle (0, -half), (radius, -half), (0, half)."""
     slant = np.sqrt(radius * radius + 4.0 * half * half)
     above_side = (2.0 * half * r + radius * (z - half)) / slant
     below_base = -half - z
@@ -154,22 +184,23 @@ def _cone_distance(radius: float, half: float, r: float, z: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _gap(low: float, high: float, half: float) -> float:
+def _interval_gap(low: float, high: float, half: float) -> float:
+    """Returns the distance between the intervals [low, high] and [-half, half]."""
     return max(max(low - half, -half - high), 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _span_bound(solid: Solid, pieces: Array, n: int) -> float:
-    """Bounds the distance of the triangle pieces[n] from a box or cylinder by the triangle's axis-aligned extent."""
+def _span_bound(solid: Solid, pieces: Array, index: int) -> float:
+    """Returns a lower bound of a triangle's distance from a box or cylinder, by the triangle's axis-aligned box."""
     kind, p0, p1, p2 = solid
     x, y, z = (
-        (pieces[n, 0], pieces[n, 3], pieces[n, 6]),
-        (pieces[n, 1], pieces[n, 4], pieces[n, 7]),
-        (pieces[n, 2], pieces[n, 5], pieces[n, 8]),
+        (pieces[index, 0], pieces[index, 3], pieces[index, 6]),
+        (pieces[index, 1], pieces[index, 4], pieces[index, 7]),
+        (pieces[index, 2], pieces[index, 5], pieces[index, 8]),
     )
-    gx = _gap(min(x), max(x), p0)
-    gy = _gap(min(y), max(y), p1 if kind == BOX else p0)
-    gz = _gap(min(z), max(z), p2 if kind == BOX else p1)
+    gx = _interval_gap(min(x), max(x), p0)
+    gy = _interval_gap(min(y), max(y), p1 if kind == BOX else p0)
+    gz = _interval_gap(min(z), max(z), p2 if kind == BOX else p1)
     if kind == CYLINDER:  # x and y together would overestimate the distance from the round side
         return np.sqrt(max(gx, gy) ** 2 + gz * gz)
     return np.sqrt(gx * gx + gy * gy + gz * gz)
@@ -179,12 +210,15 @@ def _span_bound(solid: Solid, pieces: Array, n: int) -> float:
 def _triangle_to_solid(
     triangles: Array, index: int, pose: Array, solid: Solid, margin: float, excess: float, limit: float, pieces: Array
 ) -> tuple[int, float]:
-    """Returns status and lower bound (at most `limit`) of a triangle's distance from a solid, by subdivision."""
+    """Bounds the distance of a triangle from a solid by subdivision of the triangle; see `surface_to_solid`.
+
+    The bound of a piece is the distance of its centroid minus the distance of its farthest vertex from the centroid.
+    """
     for vertex in range(0, 9, 3):
         x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
         for row in range(3):
             pieces[0, vertex + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
-    depth, visited, status = 1, 0, CLEAR
+    depth, visited = 1, 0
     while depth > 0:
         depth -= 1
         visited += 1
@@ -198,26 +232,31 @@ def _triangle_to_solid(
             x, y, z = pieces[depth, vertex] - cx, pieces[depth, vertex + 1] - cy, pieces[depth, vertex + 2] - cz
             radius = max(radius, x * x + y * y + z * z)
         radius = np.sqrt(radius)
-        centre = solid_distance(solid, cx, cy, cz) - margin
-        if centre - radius >= limit:
+        distance = solid_distance(solid, cx, cy, cz) - margin
+        if distance - radius >= limit:
             continue
-        if centre < -ROUNDING - excess:
+        if distance < -ROUNDING - excess:
             return TOUCHING, 0.0
-        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no part of the triangle is deep enough
+        if distance < -ROUNDING and distance - radius >= -ROUNDING - excess:  # no part of the triangle is deep enough
             return TOO_CLOSE, 0.0
-        if radius <= MAX_RADIUS_FRACTION * centre or radius <= MIN_PIECE_RADIUS_M < centre - ROUNDING:
-            limit = centre - radius
+        if radius <= MAX_RADIUS_FRACTION * distance or radius <= MIN_PIECE_RADIUS_M < distance - ROUNDING:
+            limit = distance - radius
             continue
         if radius <= MIN_PIECE_RADIUS_M or visited > MAX_PIECES or depth > 60:
             return TOO_CLOSE, 0.0
         halve_longest_edge(pieces, depth, 0.0)
         depth += 2
-    return status, limit
+    return CLEAR, limit
 
 
 @njit(cache=True, nogil=True)
 def _box_to_solid(boxes: Array, node: int, pose: Array, solid: Solid) -> float:
-    """Bounds the distance of a tree's box from a solid along the face normals of the box and of the solid's box."""
+    """Returns a lower bound of the distance between a node's box and the bounding box of a solid, -inf if unbounded.
+
+    The centre c, the axes a and the half extents of the node's box are expressed in the frame of the solid, whose
+    bounding box has the half extents h. The bound is the maximum of |c . a| - half - sum |h_i a_i| over the axes, and
+    of the distance between h and the extent of the node's box along the solid's axes (separating-axis tests).
+    """
     kind, p0, p1, p2 = solid
     if kind in (PLANE, HALF_SPACE):
         return -np.inf
@@ -242,7 +281,7 @@ def _box_to_solid(boxes: Array, node: int, pose: Array, solid: Solid) -> float:
 
 @njit(cache=True, nogil=True)
 def _box_to_box(boxes: Array, node: int, other_boxes: Array, other: int, pose: Array) -> float:
-    """Bounds the distance of two trees' boxes along their face normals."""
+    """Returns a lower bound of the distance between two nodes' boxes, with the tests of `_box_to_solid`."""
     x, y, z = boxes[node, 0], boxes[node, 1], boxes[node, 2]
     dx = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_boxes[other, 0]
     dy = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3] - other_boxes[other, 1]
@@ -258,14 +297,9 @@ def _box_to_box(boxes: Array, node: int, other_boxes: Array, other: int, pose: A
         c1 = abs(ax * other_boxes[other, 6] + ay * other_boxes[other, 7] + az * other_boxes[other, 8])
         c2 = abs(ax * other_boxes[other, 9] + ay * other_boxes[other, 10] + az * other_boxes[other, 11])
         half = boxes[node, 12 + axis]
-        best = max(
-            best,
-            abs(dx * ax + dy * ay + dz * az)
-            - half
-            - c0 * other_boxes[other, 12]
-            - c1 * other_boxes[other, 13]
-            - c2 * other_boxes[other, 14],
-        )
+        gap = abs(dx * ax + dy * ay + dz * az) - half
+        gap -= c0 * other_boxes[other, 12]
+        best = max(best, gap - c1 * other_boxes[other, 13] - c2 * other_boxes[other, 14])
         e0, e1, e2 = e0 + half * c0, e1 + half * c1, e2 + half * c2
     g0 = max(abs(dx * other_boxes[other, 3] + dy * other_boxes[other, 4] + dz * other_boxes[other, 5]) - e0, 0.0)
     g1 = max(abs(dx * other_boxes[other, 6] + dy * other_boxes[other, 7] + dz * other_boxes[other, 8]) - e1, 0.0)
@@ -277,7 +311,7 @@ def _box_to_box(boxes: Array, node: int, other_boxes: Array, other: int, pose: A
 def surface_to_solid(
     surface: Surfaces, root: int, pose: Array, solid: Solid, margin: float, excess: float, limit: float, memory: Memory
 ) -> tuple[int, float]:
-    """Bounds the distance of a surface from a solid.
+    """Returns a lower bound of the distance of a surface from a solid.
 
     Args:
         surface: Trees with the surface.
@@ -285,12 +319,12 @@ def surface_to_solid(
         pose: Pose of the surface in the solid's frame, shape (3, 4).
         solid: Closed form.
         margin: Distance subtracted from every distance [m].
-        excess: Maximum distance of the surface outside its body [m]; only a deeper point proves contact.
+        excess: Maximum distance by which the surface lies outside its body [m]; only a deeper point proves contact.
         limit: Maximum of the bound [m].
         memory: Working memory.
 
     Returns:
-        The status, and the lower bound of the distance minus the margin [m].
+        The status, and a lower bound of the distance minus the margin [m].
     """
     spheres, boxes, children, triangles = surface
     stack, bounds, pieces = memory.stack, memory.bounds, memory.pieces
@@ -330,6 +364,7 @@ def surface_to_solid(
 
 @njit(cache=True, nogil=True)
 def _centre_distance(spheres: Array, node: int, pose: Array, solid: Solid) -> float:
+    """Returns the signed distance of the centre of a node's sphere from a solid."""
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return solid_distance(
         solid,
@@ -340,7 +375,8 @@ def _centre_distance(spheres: Array, node: int, pose: Array, solid: Solid) -> fl
 
 
 @njit(cache=True, nogil=True)
-def _sphere_gap(spheres: Array, node: int, other_spheres: Array, other: int, pose: Array) -> float:
+def _centre_gap(spheres: Array, node: int, other_spheres: Array, other: int, pose: Array) -> float:
+    """Returns the distance between the centres of two nodes' spheres."""
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return np.sqrt(
         (pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_spheres[other, 0]) ** 2
@@ -361,7 +397,7 @@ def surface_to_surface(
     limit: float,
     memory: Memory,
 ) -> tuple[int, float]:
-    """Bounds the distance between two surfaces.
+    """Returns a lower bound of the distance between two surfaces.
 
     Args:
         surface: Trees with the first surface.
@@ -370,12 +406,12 @@ def surface_to_surface(
         other_root: Root node of the other surface.
         pose: Pose of the first surface in the frame of the other, shape (3, 4).
         margin: Distance subtracted from every distance [m].
-        excess: Maximum distance of the surfaces outside their bodies [m]; only a deeper point proves contact.
+        excess: Maximum distance by which the surfaces lie outside their bodies [m]; only a deeper point proves contact.
         limit: Maximum of the bound [m].
         memory: Working memory.
 
     Returns:
-        The status, and the lower bound of the distance minus the margin [m].
+        The status, and a lower bound of the distance minus the margin [m].
     """
     spheres, boxes, children, triangles = surface
     other_spheres, other_boxes, other_children, other_triangles = other_surface
@@ -405,19 +441,19 @@ def surface_to_surface(
             a, b, other_a, other_b = children[node, 0], children[node, 1], other, other
         else:
             a, b, other_a, other_b = node, node, other_children[other, 0], other_children[other, 1]
-        gap_a = _sphere_gap(spheres, a, other_spheres, other_a, pose) - margin
-        gap_b = _sphere_gap(spheres, b, other_spheres, other_b, pose) - margin
-        both_a, both_b = spheres[a, 3] + other_spheres[other_a, 3], spheres[b, 3] + other_spheres[other_b, 3]
-        if gap_a - both_a < gap_b - both_b:
+        gap_a = _centre_gap(spheres, a, other_spheres, other_a, pose) - margin
+        gap_b = _centre_gap(spheres, b, other_spheres, other_b, pose) - margin
+        radii_a, radii_b = spheres[a, 3] + other_spheres[other_a, 3], spheres[b, 3] + other_spheres[other_b, 3]
+        if gap_a - radii_a < gap_b - radii_b:
             a, b, other_a, other_b = b, a, other_b, other_a
-            gap_a, gap_b, both_a, both_b = gap_b, gap_a, both_b, both_a
-        for child, partner, gap, both in ((a, other_a, gap_a, both_a), (b, other_b, gap_b, both_b)):
-            if gap - both >= limit:
+            gap_a, gap_b, radii_a, radii_b = gap_b, gap_a, radii_b, radii_a
+        for child, partner, gap, radii in ((a, other_a, gap_a, radii_a), (b, other_b, gap_b, radii_b)):
+            if gap - radii >= limit:
                 continue
-            if both <= MAX_RADIUS_FRACTION * gap:
-                limit = gap - both
+            if radii <= MAX_RADIUS_FRACTION * gap:
+                limit = gap - radii
             elif limit <= 0.0 or _box_to_box(boxes, child, other_boxes, partner, pose) - margin < limit:
-                stack[depth, 0], stack[depth, 1], bounds[depth] = child, partner, gap - both
+                stack[depth, 0], stack[depth, 1], bounds[depth] = child, partner, gap - radii
                 depth += 1
     return result, max(limit, 0.0)
 
@@ -426,6 +462,7 @@ def surface_to_surface(
 def _triangle_to_triangle(
     triangles: Array, index: int, pose: Array, others: Array, other: int, vertices: Array
 ) -> float:
+    """Returns the distance between two triangles; `pose` transforms the first triangle to the frame of the second."""
     for vertex in range(0, 9, 3):
         x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
         for row in range(3):
@@ -437,7 +474,11 @@ def _triangle_to_triangle(
 def _motion_in_rotations(
     spheres: Array, node: int, pose: Array, origins: Array, axes: Array, max_angles: Array
 ) -> float:
-    """Bounds the motion of any point of a node's sphere under Rotations [m], plus ROUNDING."""
+    """Returns an upper bound M of the motion of a node's sphere under `Rotations` [m], with ROUNDING added.
+
+    A rotation by up to d about an axis at the distance D from the centre of the sphere, with radius r, adds
+    d (D + r + M) to the bound M of the rotations before it.
+    """
     x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
     px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
     py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
@@ -455,14 +496,14 @@ def _motion_in_rotations(
 def surfaces_stay_apart(
     surface: Surfaces, root: int, other_surface: Surfaces, other_root: int, pose: Array, rotations: Rotations
 ) -> bool:
-    """Returns whether a rotation of the first surface is proven collision-free.
+    """Returns whether the first surface is proven collision-free with the other surface during rotations.
 
     Args:
         surface: Trees with the first surface.
         root: Root node of the first surface.
         other_surface: Trees with the other surface.
         other_root: Root node of the other surface.
-        pose: Pose of the first surface in the frame of the other, at the middle of the rotation; shape (3, 4).
+        pose: Pose of the first surface in the frame of the other at zero rotation, shape (3, 4).
         rotations: Rotations of the first surface, in the frame of the other.
     """
     spheres, boxes, children, triangles = surface
@@ -476,7 +517,7 @@ def surfaces_stay_apart(
         visited += 1
         node, other = stack[depth, 0], stack[depth, 1]
         needed = _motion_in_rotations(spheres, node, pose, origins, axes, max_angles)
-        gap = _sphere_gap(spheres, node, other_spheres, other, pose)
+        gap = _centre_gap(spheres, node, other_spheres, other, pose)
         if (
             gap - spheres[node, 3] - other_spheres[other, 3] >= needed
             or _box_to_box(boxes, node, other_boxes, other, pose) >= needed

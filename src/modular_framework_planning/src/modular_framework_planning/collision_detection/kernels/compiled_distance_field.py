@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Distance field over many solids, compiled: each grid cell stores the solids nearest to its centre.
 
-The field checks a link against all solids of the world at once. The stored distance at the cell centre rules out
-distant solids; near solids are checked exactly. Cells are filled on first use.
+The field checks a link against all solids of the world at once. A solid's distance from a point is at least its stored
+distance from the cell's centre minus the point's distance from that centre. This bound rules out distant solids; near
+solids are checked exactly. Cells are filled on first use.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     TOO_CLOSE,
     TOUCHING,
     Memory,
-    Solid,
     placed_solid_distance,
+    relative_pose,
+    solid_of,
     surface_to_solid,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
@@ -38,8 +40,8 @@ class DistanceField(NamedTuple):
         poses: Poses of the solids in the planning frame, shape (n, 3, 4).
         grid: Minimum corner of the grid and edge length of a cell, shape (4,) [m].
         is_filled: Whether each cell is filled, shape (x, y, z).
-        nearest: Solids nearest to each cell's centre, in ascending order; shape (x, y, z, min(n, NEAREST_SOLIDS)).
-        distances: Distances of these solids from the centre, negative inside; same shape [m].
+        nearest: Solids nearest to each cell's centre, nearest first; shape (x, y, z, min(n, NEAREST_SOLIDS)).
+        distances: Signed distances of these solids from the centre, negative inside; same shape [m].
     """
 
     kinds: NDArray[np.int64]
@@ -55,8 +57,8 @@ class DistanceField(NamedTuple):
 def _solid_gap(
     kinds: NDArray[np.int64], sizes: Array, poses: Array, solid_index: int, x: float, y: float, z: float
 ) -> float:
-    solid = Solid(kinds[solid_index], sizes[solid_index, 0], sizes[solid_index, 1], sizes[solid_index, 2])
-    return placed_solid_distance(solid, poses, solid_index, x, y, z)
+    """Returns the signed distance of the point (x, y, z) from a solid [m]."""
+    return placed_solid_distance(solid_of(kinds, sizes, solid_index), poses, solid_index, x, y, z)
 
 
 @njit(cache=True, nogil=True)
@@ -70,23 +72,23 @@ def _fill_cell(
     y: float,
     z: float,
 ) -> None:
-    """Writes the solids nearest to the point (x, y, z), and their distances; both have shape (k,)."""
-    stored, filled = len(nearest), 0
+    """Writes the solids nearest to the point (x, y, z), and their signed distances, by insertion sort; shape (k,)."""
+    capacity, count = len(nearest), 0
     for solid_index in range(len(kinds)):
         gap = _solid_gap(kinds, sizes, poses, solid_index, x, y, z)
-        if filled == stored and gap >= distances[filled - 1]:
+        if count == capacity and gap >= distances[count - 1]:
             continue
-        slot = min(filled, stored - 1)
+        slot = min(count, capacity - 1)
         while slot > 0 and distances[slot - 1] > gap:
             distances[slot], nearest[slot] = distances[slot - 1], nearest[slot - 1]
             slot -= 1
         distances[slot], nearest[slot] = gap, solid_index
-        filled = min(filled + 1, stored)
+        count = min(count + 1, capacity)
 
 
 @njit(cache=True, nogil=True)
 def field_cell(field: DistanceField, x: float, y: float, z: float) -> tuple[int, int, int, float]:
-    """Fills the cell that contains a point.
+    """Returns the cell that contains a point, after filling the cell if necessary.
 
     Args:
         field: Distance field.
@@ -95,7 +97,8 @@ def field_cell(field: DistanceField, x: float, y: float, z: float) -> tuple[int,
         z: Coordinate of the point in the field's frame [m].
 
     Returns:
-        The three indices of the cell, -1 outside the grid, and the distance of the point from the cell centre [m].
+        The three indices of the cell, the first -1 outside the grid, and the distance of the point from the cell's
+        centre [m].
     """
     grid, is_filled = field.grid, field.is_filled
     edge = grid[3]
@@ -105,23 +108,23 @@ def field_cell(field: DistanceField, x: float, y: float, z: float) -> tuple[int,
     ):  # NaN also takes this branch
         return -1, 0, 0, 0.0
     i, j, k = int(u), int(v), int(w)
-    u, v, w = grid[0] + (i + 0.5) * edge, grid[1] + (j + 0.5) * edge, grid[2] + (k + 0.5) * edge
+    cx, cy, cz = grid[0] + (i + 0.5) * edge, grid[1] + (j + 0.5) * edge, grid[2] + (k + 0.5) * edge
     if not is_filled[i, j, k]:
-        _fill_cell(field.kinds, field.sizes, field.poses, field.nearest[i, j, k], field.distances[i, j, k], u, v, w)
+        _fill_cell(field.kinds, field.sizes, field.poses, field.nearest[i, j, k], field.distances[i, j, k], cx, cy, cz)
         is_filled[i, j, k] = True
-    return i, j, k, np.sqrt((x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2)
+    return i, j, k, np.sqrt((x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2)
 
 
 @njit(cache=True, nogil=True)
 def field_distance(field: DistanceField, x: float, y: float, z: float, sufficient: float) -> float:
-    """Returns a lower bound of a point's distance from the nearest solid, exact if less than `sufficient` [m].
+    """Returns a lower bound of a point's signed distance from the nearest solid, exact if below `sufficient` [m].
 
     Args:
         field: Distance field.
         x: Coordinate of the point in the planning frame [m].
         y: Coordinate of the point in the planning frame [m].
         z: Coordinate of the point in the planning frame [m].
-        sufficient: Distance from which a lower bound is good enough [m].
+        sufficient: Distance from which any lower bound suffices [m].
     """
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
     i, j, k, offset = field_cell(field, x, y, z)
@@ -143,18 +146,6 @@ def field_distance(field: DistanceField, x: float, y: float, z: float, sufficien
 
 
 @njit(cache=True, nogil=True)
-def _pose_in_solid(pose: Array, poses: Array, solid_index: int, out: Array) -> None:
-    """Writes a pose, shape (3, 4), in the frame of a solid."""
-    for row in range(3):
-        for column in range(4):
-            value = 0.0
-            for inner in range(3):
-                part = pose[inner, column] - (poses[solid_index, inner, 3] if column == 3 else 0.0)
-                value += poses[solid_index, inner, row] * part
-            out[row, column] = value
-
-
-@njit(cache=True, nogil=True)
 def surface_to_field(
     surface: Surfaces,
     root: int,
@@ -165,7 +156,7 @@ def surface_to_field(
     limit: float,
     memory: Memory,
 ) -> tuple[int, float]:
-    """Bounds the distance of a surface from all solids of a field.
+    """Returns a lower bound of the distance of a surface from all solids of a field.
 
     Args:
         surface: Trees with the surface.
@@ -173,12 +164,12 @@ def surface_to_field(
         pose: Pose of the surface in the planning frame, shape (3, 4).
         field: Distance field.
         margin: Distance subtracted from every distance [m].
-        excess: Maximum distance of the surface outside its body [m]; only a deeper point proves contact.
+        excess: Maximum distance by which the surface lies outside its body [m]; only a deeper point proves contact.
         limit: Maximum of the bound [m].
         memory: Working memory.
 
     Returns:
-        The status and the lower bound [m], or TOUCHING and the index of a touched solid.
+        The status and a lower bound of the distance minus the margin [m], or TOUCHING and the index of a touched solid.
     """
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
     relative, result, reach = memory.relative, CLEAR, surface.spheres[root, 3] + margin
@@ -187,13 +178,13 @@ def surface_to_field(
     stored, count = nearest.shape[3], 0
     while i >= 0 and count < stored and distances[i, j, k, count] - offset - reach < limit:
         count += 1
-    use_all = i < 0 or (count == stored and stored < len(kinds))
-    for order in range(len(kinds) if use_all else count):
-        solid_index = order if use_all else nearest[i, j, k, order]
+    checks_all = i < 0 or (count == stored and stored < len(kinds))
+    for order in range(len(kinds) if checks_all else count):
+        solid_index = order if checks_all else nearest[i, j, k, order]
         if _solid_gap(kinds, sizes, poses, solid_index, x, y, z) - reach >= limit:
             continue
-        _pose_in_solid(pose, poses, solid_index, relative)
-        solid = Solid(kinds[solid_index], sizes[solid_index, 0], sizes[solid_index, 1], sizes[solid_index, 2])
+        relative_pose(pose, poses[solid_index], relative)
+        solid = solid_of(kinds, sizes, solid_index)
         status, bound = surface_to_solid(surface, root, relative, solid, margin, excess, limit, memory)
         if status == TOUCHING:
             return TOUCHING, float(solid_index)
@@ -205,6 +196,7 @@ def surface_to_field(
 
 @njit(cache=True, nogil=True)
 def _placed_centre(spheres: Array, node: int, pose: Array) -> tuple[float, float, float]:
+    """Returns the centre of a node's sphere, transformed by the pose."""
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return (
         pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],

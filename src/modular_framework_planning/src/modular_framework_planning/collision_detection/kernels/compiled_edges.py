@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collision checks of straight joint motions for compiled planners, with a cache of results."""
+"""Collision checks of edges (straight joint motions) for compiled planners, and a cache of their results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MEMORY_CAPACITY = 256  # number of cached edges; a look-up takes less than 1 % o
 
 
 class GroupEdges(NamedTuple):
-    """Relation of a group's joint vectors to the whole robot, and the step of edge checks.
+    """Step of edge checks, and the map from joint vectors of a group to the robot: rest + joint_map @ vector.
 
     Attributes:
         rest: Joint positions of the whole robot with the group's joints at 0, shape (all,) [rad or m].
@@ -42,7 +42,7 @@ class GroupEdges(NamedTuple):
 
 
 class EdgeMemory(NamedTuple):
-    """Ring buffer of the edges checked last.
+    """Ring buffer of the latest edge checks.
 
     Attributes:
         ends: Start and end joint vector of each edge, shape (capacity, 2, joints) [rad or m].
@@ -69,7 +69,7 @@ def new_memory(joints: int) -> EdgeMemory:
 
 @njit(cache=True, nogil=True)
 def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
-    """Returns the cached result of an edge: FREE, BLOCKED, or UNKNOWN.
+    """Returns the cached result of an edge check: FREE, BLOCKED, or UNKNOWN.
 
     Args:
         memory: Edge memory.
@@ -91,7 +91,7 @@ def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
 
 @njit(cache=True, nogil=True)
 def remember(memory: EdgeMemory, start: Array, end: Array, step: float, verdict: int) -> None:
-    """Stores the result of an edge.
+    """Stores the result of an edge check.
 
     Args:
         memory: Edge memory.
@@ -115,7 +115,7 @@ def new_edge(edges: GroupEdges) -> Samples:
 
 @njit(cache=True, nogil=True)
 def _write_positions(edges: GroupEdges, state: Array, out: Array) -> None:
-    """Writes the whole robot's joint positions, shape (all,), for a joint vector of the group."""
+    """Writes the robot's joint positions, shape (all,), for a joint vector of the group."""
     for row in range(len(out)):
         out[row] = edges.rest[row]
         for joint in range(len(state)):
@@ -132,10 +132,10 @@ def check_edge(
     undecided: NDArray[np.int64],
     workspace: Workspace,
 ) -> int:
-    """Returns FREE, BLOCKED, or UNKNOWN if the bounds do not decide; the start of the edge is not checked.
+    """Checks an edge except for its start; returns FREE, BLOCKED, or UNKNOWN if the distance bounds do not decide.
 
     Args:
-        edges: Relation of the group to the whole robot, and the step.
+        edges: Step, and map from the group to the robot.
         world: Bodies and pairs.
         start: Joint vector of the group at the start [rad or m].
         end: Joint vector of the group at the end [rad or m].
@@ -147,7 +147,7 @@ def check_edge(
     _write_positions(edges, end, samples.vertices[1])
     index_samples(samples, edges.step)
     status, _ = check_samples(world, samples, 1, undecided, workspace)
-    if status != TOO_CLOSE:  # the exact check counts undecided edges
+    if status != TOO_CLOSE:  # undecided edges are counted by the exact check
         count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
 
@@ -157,7 +157,7 @@ def check_edges(edges: GroupEdges, motions: Array, *world: NDArray[Any]) -> NDAr
     """Returns the result of `check_edge` for each motion.
 
     Args:
-        edges: Relation of the group to the whole robot, and the step.
+        edges: Step, and map from the group to the robot.
         motions: Start and end joint vector of each motion, shape (n, 2, joints) [rad or m].
         *world: Arrays from `compiled_collision.arguments`.
     """
@@ -165,8 +165,7 @@ def check_edges(edges: GroupEdges, motions: Array, *world: NDArray[Any]) -> NDAr
     workspace, samples = new_workspace(bodies), new_edge(edges)
     verdicts = np.empty(len(motions), np.int64)
     _check_all(borrowed(edges), bodies, motions, borrowed(samples), borrowed(workspace), verdicts)
-    release(workspace)
-    samples.at_vertices[0] = 0
+    release(workspace, samples)
     return verdicts
 
 

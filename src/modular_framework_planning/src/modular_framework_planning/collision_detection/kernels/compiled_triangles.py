@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.geometry.spatial import Array
 
-CENTRING_STEPS = 12
-RAY = (0.4613, 0.5417, 0.7027)  # unit vector (within 1e-4) that is parallel to hardly any mesh edge
+CENTRING_STEPS = 12  # iterations of the bounding-sphere fit
+RAY = (0.4613, 0.5417, 0.7027)  # ray direction of `encloses`, a unit vector (within 1e-4) parallel to hardly any edge
 
 
 class Surfaces(NamedTuple):
-    """Trees of spheres and boxes over triangles, see build_sphere_tree; World.roots has the root of each body."""
+    """Trees of spheres and boxes over the triangles of several bodies, as returned by `build_sphere_tree`."""
 
     spheres: Array
     boxes: Array
@@ -26,7 +26,7 @@ class Surfaces(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def cut_long_edges(triangles: Array, max_edge: float) -> Array:
-    """Halves triangles (m, 9) until no edge exceeds `max_edge` [m]; spheres fit long triangles badly."""
+    """Returns triangles (k, 9), halved until no edge exceeds `max_edge` [m]; spheres fit long triangles badly."""
     result = np.empty((2 * len(triangles) + 16, 9))
     stack = np.empty((64, 9))
     used = 0
@@ -49,24 +49,24 @@ def cut_long_edges(triangles: Array, max_edge: float) -> Array:
 
 @njit(cache=True, nogil=True)
 def halve_longest_edge(pieces: Array, index: int, max_squared: float) -> bool:
-    """Splits a triangle at the middle of its longest edge.
+    """Splits a triangle at the midpoint of its longest edge.
 
     Args:
         pieces: Triangles, shape (n, 9) [m]; the halves are written to rows `index` and `index + 1`.
         index: Row of the triangle.
-        max_squared: Square of the edge length up to which the triangle stays whole [m^2].
+        max_squared: Squared edge length up to which the triangle stays whole [m^2].
 
     Returns:
         True if the triangle stays whole.
     """
-    a, b, c = 0.0, 0.0, 0.0
+    ab, bc, ca = 0.0, 0.0, 0.0  # squared edge lengths
     for row in range(3):
-        a += (pieces[index, row] - pieces[index, 3 + row]) ** 2
-        b += (pieces[index, 3 + row] - pieces[index, 6 + row]) ** 2
-        c += (pieces[index, 6 + row] - pieces[index, row]) ** 2
-    if max(a, max(b, c)) <= max_squared:
+        ab += (pieces[index, row] - pieces[index, 3 + row]) ** 2
+        bc += (pieces[index, 3 + row] - pieces[index, 6 + row]) ** 2
+        ca += (pieces[index, 6 + row] - pieces[index, row]) ** 2
+    if max(ab, max(bc, ca)) <= max_squared:
         return True
-    first, second = (0, 3) if a >= b and a >= c else ((3, 6) if b >= c else (6, 0))
+    first, second = (0, 3) if ab >= bc and ab >= ca else ((3, 6) if bc >= ca else (6, 0))
     for row in range(9):
         pieces[index + 1, row] = pieces[index, row]
     for row in range(3):
@@ -78,13 +78,13 @@ def halve_longest_edge(pieces: Array, index: int, max_squared: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def build_sphere_tree(triangles: Array) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Builds a binary tree whose nodes enclose triangles by a sphere and by a box.
+    """Builds a binary tree; each node encloses its triangles by a sphere and by a box.
 
     Args:
         triangles: Vertices, shape (m, 9) with m > 0 [m].
 
     Returns:
-        Three arrays with a row per node, node 0 being the root.
+        Three arrays with one row per node; node 0 is the root.
         Spheres, shape (2 m - 1, 4): centre and radius.
         Boxes, shape (2 m - 1, 15): centre, three axes, half extents.
         Children, shape (2 m - 1, 2): child nodes, or (-1, triangle index) for a leaf.
@@ -116,13 +116,13 @@ def build_sphere_tree(triangles: Array) -> tuple[Array, Array, NDArray[np.int32]
 
 @njit(cache=True, nogil=True)
 def _split(triangles: Array, members: NDArray[np.int64]) -> int:
-    """Partitions the members at the middle of their widest axis and returns the size of the first part."""
+    """Partitions triangles in place by their centroids on the widest axis; returns the size of the first part."""
     widest, extent, middle = 0, -1.0, 0.0
     for axis in range(3):
         low, high = np.inf, -np.inf
         for member in members:
-            centre = triangles[member, axis] + triangles[member, axis + 3] + triangles[member, axis + 6]
-            low, high = min(low, centre), max(high, centre)
+            coordinate_sum = triangles[member, axis] + triangles[member, axis + 3] + triangles[member, axis + 6]
+            low, high = min(low, coordinate_sum), max(high, coordinate_sum)
         if high - low > extent:
             widest, extent, middle = axis, high - low, 0.5 * (low + high)
     count = 0
@@ -136,37 +136,43 @@ def _split(triangles: Array, members: NDArray[np.int64]) -> int:
 
 @njit(cache=True, nogil=True)
 def _fit_sphere(triangles: Array, members: NDArray[np.int64], sphere: Array) -> None:
-    """Writes a small bounding sphere of the members (Badoiu and Clarkson: steps towards the farthest vertex)."""
+    """Writes a small bounding sphere of the members.
+
+    The centre moves towards the farthest vertex by decreasing fractions of the distance; the best centre is kept.
+    Source: M. Badoiu, K. Clarkson, "Smaller core-sets for balls", SODA 2003.
+    """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for member in members:
         for index in range(9):
             low[index % 3] = min(low[index % 3], triangles[member, index])
             high[index % 3] = max(high[index % 3], triangles[member, index])
     x, y, z = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
-    best = np.inf
+    min_square = np.inf
     for step in range(CENTRING_STEPS):
-        squared, far, vertex = -1.0, 0, 0
+        max_square, farthest, vertex = -1.0, 0, 0
         for member in members:
             for index in range(0, 9, 3):
-                distance = (
-                    (triangles[member, index] - x) ** 2
-                    + (triangles[member, index + 1] - y) ** 2
-                    + (triangles[member, index + 2] - z) ** 2
-                )
-                if distance > squared:
-                    squared, far, vertex = distance, member, index
-        if squared < best:
-            best = squared
+                dx, dy = triangles[member, index] - x, triangles[member, index + 1] - y
+                dz = triangles[member, index + 2] - z
+                squared_distance = dx * dx + dy * dy + dz * dz
+                if squared_distance > max_square:
+                    max_square, farthest, vertex = squared_distance, member, index
+        if max_square < min_square:
+            min_square = max_square
             sphere[0], sphere[1], sphere[2] = x, y, z
-        x += (triangles[far, vertex] - x) / (step + 3.0)
-        y += (triangles[far, vertex + 1] - y) / (step + 3.0)
-        z += (triangles[far, vertex + 2] - z) / (step + 3.0)
-    sphere[3] = np.sqrt(best) * (1.0 + 1.0e-12) + 1.0e-12
+        x += (triangles[farthest, vertex] - x) / (step + 3.0)
+        y += (triangles[farthest, vertex + 1] - y) / (step + 3.0)
+        z += (triangles[farthest, vertex + 2] - z) / (step + 3.0)
+    sphere[3] = np.sqrt(min_square) * (1.0 + 1.0e-12) + 1.0e-12
 
 
 @njit(cache=True, nogil=True)
 def _fit_box(triangles: Array, members: NDArray[np.int64], box: Array) -> None:
-    """Writes a bounding box of the members with an axis along their mean normal, since surface patches are flat."""
+    """Writes a bounding box of the members.
+
+    The first axis is the mean normal n, because surface patches are flat. The second axis a points from the mean vertex
+    m to the vertex that is farthest from m across n.
+    """
     nx, ny, nz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for member in members:
         t = triangles[member]
@@ -207,11 +213,8 @@ def _fit_box(triangles: Array, members: NDArray[np.int64], box: Array) -> None:
         low, high = np.inf, -np.inf
         for member in members:
             for index in range(0, 9, 3):
-                value = (
-                    dx * triangles[member, index]
-                    + dy * triangles[member, index + 1]
-                    + dz * triangles[member, index + 2]
-                )
+                x, y, z = triangles[member, index], triangles[member, index + 1], triangles[member, index + 2]
+                value = dx * x + dy * y + dz * z
                 low, high = min(low, value), max(high, value)
         box[12 + axis] = 0.5 * (high - low) + 1e-12
         middle = 0.5 * (low + high)
@@ -220,7 +223,7 @@ def _fit_box(triangles: Array, members: NDArray[np.int64], box: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def triangle_distance(first: Array, second: Array) -> float:
-    """Returns the distance of two triangles [m], 0 if they intersect; each has 9 coordinates."""
+    """Returns the distance between two triangles, shape (9,) each [m]; 0 if they intersect."""
     best = min(_faces_distance(first, second), _faces_distance(second, first))
     if best <= 0.0:
         return 0.0
@@ -232,7 +235,7 @@ def triangle_distance(first: Array, second: Array) -> float:
 
 @njit(cache=True, nogil=True)
 def _faces_distance(face: Array, other: Array) -> float:
-    """Returns the squared distance of the vertices of `other` that project into `face`, 0 if an edge crosses `face`."""
+    """Returns the minimum squared distance of `other`'s vertices above or below `face`, 0 if an edge crosses `face`."""
     ux, uy, uz = face[3] - face[0], face[4] - face[1], face[5] - face[2]
     vx, vy, vz = face[6] - face[0], face[7] - face[1], face[8] - face[2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -252,15 +255,10 @@ def _faces_distance(face: Array, other: Array) -> float:
             continue
         fraction = heights[vertex] / span if span != 0.0 else 0.0
         p, q = 3 * vertex, 3 * next_vertex
-        if _projects_inside(
-            face,
-            nx,
-            ny,
-            nz,
-            other[p] + fraction * (other[q] - other[p]),
-            other[p + 1] + fraction * (other[q + 1] - other[p + 1]),
-            other[p + 2] + fraction * (other[q + 2] - other[p + 2]),
-        ):
+        x = other[p] + fraction * (other[q] - other[p])
+        y = other[p + 1] + fraction * (other[q + 1] - other[p + 1])
+        z = other[p + 2] + fraction * (other[q + 2] - other[p + 2])
+        if _projects_inside(face, nx, ny, nz, x, y, z):
             return 0.0
     for vertex in range(3):
         p = 3 * vertex
@@ -283,7 +281,7 @@ def _projects_inside(face: Array, nx: float, ny: float, nz: float, x: float, y: 
 
 @njit(cache=True, nogil=True)
 def _edge_distance(first: Array, edge: int, second: Array, other: int) -> float:
-    """Returns the squared distance between an edge of the first triangle and an edge of the second."""
+    """Returns the squared distance between two edges, as in C. Ericson, Real-Time Collision Detection, 2005, 5.1.9."""
     p, q, r, s = 3 * edge, 3 * ((edge + 1) % 3), 3 * other, 3 * ((other + 1) % 3)
     ax, ay, az = first[q] - first[p], first[q + 1] - first[p + 1], first[q + 2] - first[p + 2]
     bx, by, bz = second[s] - second[r], second[s + 1] - second[r + 1], second[s + 2] - second[r + 2]
@@ -296,20 +294,17 @@ def _edge_distance(first: Array, edge: int, second: Array, other: int) -> float:
     if across < 0.0 or across > 1.0:
         across = min(max(across, 0.0), 1.0)
         along = min(max((ab * across - aw) / aa, 0.0), 1.0) if aa > 0.0 else 0.0
-    return (
-        (wx + along * ax - across * bx) ** 2
-        + (wy + along * ay - across * by) ** 2
-        + (wz + along * az - across * bz) ** 2
-    )
+    x, y, z = wx + along * ax - across * bx, wy + along * ay - across * by, wz + along * az - across * bz
+    return x * x + y * y + z * z
 
 
 @njit(cache=True, nogil=True)
 def encloses(surface: Surfaces, root: int, x: float, y: float, z: float) -> bool:
-    """Returns whether a closed surface contains a point: a ray then exits more often than it enters.
+    """Returns whether a closed surface contains a point: a ray from the point then exits more often than it enters.
 
     Args:
         surface: Trees with the surface.
-        root: Root of the surface's tree.
+        root: Root node of the surface.
         x: Coordinate of the point in the surface's frame [m].
         y: Coordinate of the point in the surface's frame [m].
         z: Coordinate of the point in the surface's frame [m].
@@ -325,8 +320,8 @@ def encloses(surface: Surfaces, root: int, x: float, y: float, z: float) -> bool
         wx, wy, wz = spheres[node, 0] - x, spheres[node, 1] - y, spheres[node, 2] - z
         along = wx * dx + wy * dy + wz * dz
         squared = wx * wx + wy * wy + wz * wz
-        reach = spheres[node, 3] * spheres[node, 3]
-        if squared - along * along > reach or (along < 0.0 and squared > reach):
+        squared_radius = spheres[node, 3] * spheres[node, 3]
+        if squared - along * along > squared_radius or (along < 0.0 and squared > squared_radius):
             continue
         if children[node, 0] >= 0:
             stack[depth], stack[depth + 1] = children[node, 0], children[node, 1]
@@ -338,7 +333,7 @@ def encloses(surface: Surfaces, root: int, x: float, y: float, z: float) -> bool
 
 @njit(cache=True, nogil=True)
 def _crossing(t: Array, x: float, y: float, z: float) -> int:
-    """Returns 1 if the ray from (x, y, z) exits through the triangle's front, -1 if it enters, else 0."""
+    """Returns 1 if the ray from (x, y, z) exits through the triangle t, -1 if it enters, 0 if it misses."""
     dx, dy, dz = RAY
     ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
     vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]

@@ -187,8 +187,7 @@ def grow(trees: Trees, space: Space, samples: Array, verdict: int, *world: NDArr
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
     status = _grow(borrowed(trees), borrowed(space), samples, verdict, bodies, borrowed(edge), borrowed(workspace))
-    release(workspace)
-    edge.at_vertices[0] = 0
+    release(workspace, edge)
     return status
 
 
