@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Quintic polynomials between trajectory points: coefficients, values and samples of the curve.
 
-The functions are compiled, because NumPy's overhead would dominate for a few hundred points.
+The functions are compiled, because the overhead of NumPy calls dominates for a few hundred points.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from modular_framework_planning.geometry.spatial import Array
 @njit(cache=True, nogil=True)
 def quintic_coefficients(times: Array, positions: Array, velocities: Array, accelerations: Array) -> Array:
     """Returns the polynomial coefficients between points, lowest power first, shape (n - 1, 6, joints).
+
+    The polynomial of a segment takes the time since the start of the segment.
 
     Args:
         times: Times of the points, shape (n,) [s].
@@ -69,14 +71,16 @@ def curve_values(times: Array, coefficients: Array, sample_times: Array, order_c
 
 @njit(cache=True, nogil=True)
 def curve_samples(times: Array, coefficients: Array, positions: Array, velocities: Array, step: float) -> Array:
-    """Samples positions along the curve, in steps of at most about `step`, shape (m, joints).
+    """Returns positions along the curve, shape (m, joints), in joint steps of about `step`.
+
+    The number of samples of a segment follows from the displacement and from the maximum speed at its ends.
 
     Args:
         times: Times of the points, shape (n,), n > 1 [s].
         coefficients: Polynomial coefficients, shape (n - 1, 6, joints).
         positions: Positions of the points, shape (n, joints) [rad or m].
-        velocities: Velocities of the points, shape (n, joints).
-        step: Maximum joint displacement between samples [rad or m].
+        velocities: Velocities of the points, shape (n, joints) [rad/s or m/s].
+        step: Approximate maximum joint displacement between samples [rad or m].
     """
     segments, _, joints = coefficients.shape
     counts = np.empty(segments, dtype=np.int64)
@@ -101,7 +105,7 @@ def curve_samples(times: Array, coefficients: Array, positions: Array, velocitie
 
 @njit(cache=True, nogil=True)
 def bent_segments(times: Array, coefficients: Array, positions: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Returns whether the curve leaves the straight line between consecutive points, shape (n - 1,).
+    """Returns whether the curve, at thirds of the time, leaves the line between consecutive points, shape (n - 1,).
 
     Args:
         times: Times of the points, shape (n,) [s].
@@ -118,9 +122,9 @@ def bent_segments(times: Array, coefficients: Array, positions: Array, tolerance
                 c1, c2, c3 = coefficients[i, 1, j], coefficients[i, 2, j], coefficients[i, 3, j]
                 c4, c5 = coefficients[i, 4, j], coefficients[i, 5, j]
                 offset[j] = t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
-                slope = positions[i + 1, j] - positions[i, j]
-                squared_length += slope * slope
-                projection += offset[j] * slope
+                displacement = positions[i + 1, j] - positions[i, j]
+                squared_length += displacement * displacement
+                projection += offset[j] * displacement
             fraction = projection / max(squared_length, 1e-30)
             for j in range(joints):
                 if abs(offset[j] - fraction * (positions[i + 1, j] - positions[i, j])) > tolerance:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Polylines of joint vectors: removal of redundant vertices, and pieces that lie on known edges.
 
-The functions are compiled, because NumPy's overhead would dominate for a few vertices.
+The functions are compiled, because the overhead of NumPy calls dominates for a few vertices.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def needed_vertices(path: Array, tolerance: float) -> NDArray[np.int64]:
     """Returns the indices of the vertices that are neither repeated nor inside a straight line.
 
     Args:
-        path: Polyline, shape (n, joints).
+        path: Polyline, shape (n, joints) [rad or m].
         tolerance: Minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex.
     """
     count, joints = path.shape
@@ -56,11 +56,11 @@ def pieces_on_edges(
     """Returns the indices of the pieces of a polyline that lie on a selected edge.
 
     Args:
-        path: Polyline, shape (n, joints).
-        edges: Ends of the edges, shape (m, 2, joints).
-        is_selected: Whether an edge is considered, shape (m,).
-        min_change: Maximum joint displacement of a piece that is not looked up [rad or m].
-        tolerance: Maximum joint distance between an edge and a point on this edge [rad or m].
+        path: Polyline, shape (n, joints) [rad or m].
+        edges: Start and end of each edge, shape (m, 2, joints) [rad or m].
+        is_selected: Whether each edge is selected, shape (m,).
+        min_change: Joint displacement up to which a piece is left out [rad or m].
+        tolerance: Maximum joint distance of the ends of a piece from an edge [rad or m].
     """
     joints = path.shape[1]
     pieces, kept_count = np.empty(max(len(path) - 1, 0), np.int64), 0
@@ -84,6 +84,7 @@ def pieces_on_edges(
 
 @njit(cache=True, nogil=True)
 def _is_on_edge(point: Array, edge: Array, tolerance: float) -> bool:
+    """Returns whether no joint of a point is farther than `tolerance` from the nearest point of an edge."""
     squared_length, projection = 0.0, 0.0
     for joint in range(len(point)):
         offset = edge[1, joint] - edge[0, joint]
@@ -97,7 +98,7 @@ def _is_on_edge(point: Array, edge: Array, tolerance: float) -> bool:
 
 
 def warm_up() -> None:
-    """Compiles the functions of this module or loads them from the cache."""
+    """Compiles the kernels of this module, or loads them from the cache."""
     path = np.array([[0.0, 0.0], [1.0, 0.0]])
     needed_vertices(path, 0.0)
     pieces_on_edges(path, path[None], np.ones(1, dtype=bool), 0.0, 0.0)

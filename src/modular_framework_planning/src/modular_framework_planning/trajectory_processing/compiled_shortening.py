@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled path shortening in three stages.
 
-- Dropping: vertices whose neighbours can be connected directly are removed, longest connections first.
-- Shortcutting: random pairs of points on the path are connected directly if that is shorter.
-- Pulling: each inner vertex is moved halfway towards the line between its neighbours.
+- Dropping: vertices between two vertices with a free direct edge are removed; long edges are tried first.
+- Shortcutting: random pairs of points on the path are connected by an edge if the edge is free and shorter.
+- Pulling: each inner vertex moves halfway towards the line between its neighbours if both new edges are free.
 
-`next_edge` proposes the next edge that would change the path; `apply_verdict` changes the path if this edge is free.
+`next_edge` proposes the next edge of a stage; `apply_verdict` changes the path if this edge is free.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
     release,
 )
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.kinematics.compiled_kinematics import joint_distance
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
 MIN_SHORTCUT_GAIN = 0.01  # minimum gain of a shortcut, as a fraction of the path length
@@ -52,15 +53,15 @@ FINISHED, UNDECIDED, PAUSED = range(3)
 STAGE, SIZE = 0, 1
 BASE, CANDIDATE, KEPT = 2, 3, 4  # start and end vertex of the proposed edge, index of the last kept vertex
 ATTEMPT, FAILURES, FIRST, LAST = 2, 3, 4, 5  # attempts, consecutive failures, vertices before the ends of the shortcut
-PULL_ROUND, VERTEX, HAS_MOVED, CHECKS_SECOND_EDGE = 2, 3, 4, 5  # last: whether the second edge is checked
+PULL_ROUND, VERTEX, HAS_MOVED, CHECKS_SECOND_EDGE = 2, 3, 4, 5  # round, pulled vertex, and two flags
 
 
 class Shortening(NamedTuple):
     """A path and the progress of its shortening.
 
     Attributes:
-        path: Vertices of the path, shape (capacity, joints).
-        edge: Proposed edge, shape (2, joints).
+        path: Vertices of the path, shape (capacity, joints) [rad or m].
+        edge: Proposed edge, shape (2, joints) [rad or m].
         progress: Values at the indices above, shape (6,).
         random_numbers: Random numbers from 0 to 1, shape (shortcuts, 2).
         min_gain: Minimum gain of a pulled vertex, shape (1,) [rad or m].
@@ -74,25 +75,17 @@ class Shortening(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _distance(first: Array, second: Array) -> float:
-    squared_length = 0.0
-    for joint in range(len(first)):
-        squared_length += (second[joint] - first[joint]) ** 2
-    return np.sqrt(squared_length)
-
-
-@njit(cache=True, nogil=True)
 def _lengths(path: Array, size: int) -> Array:
     """Returns the path length up to each vertex."""
     lengths = np.zeros(size)
     for index in range(1, size):
-        lengths[index] = lengths[index - 1] + _distance(path[index - 1], path[index])
+        lengths[index] = lengths[index - 1] + joint_distance(path[index - 1], path[index])
     return lengths
 
 
 @njit(cache=True, nogil=True)
 def _enter_stage(shortening: Shortening, stage: int) -> None:
-    """Enters a stage; a path of two vertices is done."""
+    """Enters a stage, or DONE for a path of two vertices."""
     path, _, progress, _, min_gain = shortening
     if stage == PULLS:
         kept = needed_vertices(path[: progress[SIZE]], VERTEX_TOLERANCE)
@@ -109,7 +102,7 @@ def _enter_stage(shortening: Shortening, stage: int) -> None:
 
 @njit(cache=True, nogil=True)
 def next_edge(shortening: Shortening) -> bool:
-    """Writes the next edge that would change the path; returns False if the shortening is done."""
+    """Proposes the next edge that would change the path; returns False if the shortening is done."""
     progress = shortening.progress
     while progress[STAGE] != DONE:
         stage = progress[STAGE]
@@ -149,6 +142,7 @@ def _keep(shortening: Shortening, vertex: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _next_drop(shortening: Shortening) -> bool:
+    """Proposes the edge from the last kept vertex to the farthest untested vertex; returns False at the path's end."""
     path, edge, progress, _, _ = shortening
     while progress[BASE] < progress[SIZE] - 1:
         progress[CANDIDATE] -= 1
@@ -162,7 +156,7 @@ def _next_drop(shortening: Shortening) -> bool:
 
 @njit(cache=True, nogil=True)
 def _write_point(path: Array, lengths: Array, path_position: float, out: Array) -> int:
-    """Writes the point at a length along the path and returns the index of the vertex before this point."""
+    """Writes the point at a path position; returns the index of the vertex before this point."""
     index = min(max(int(np.searchsorted(lengths, path_position, side="right")) - 1, 0), len(lengths) - 2)
     span = lengths[index + 1] - lengths[index]
     fraction = 0.0 if span <= 0.0 else (path_position - lengths[index]) / span
@@ -173,22 +167,21 @@ def _write_point(path: Array, lengths: Array, path_position: float, out: Array) 
 
 @njit(cache=True, nogil=True)
 def _next_shortcut(shortening: Shortening) -> bool:
+    """Proposes the next random shortcut with sufficient gain; returns False after the last attempt."""
     path, edge, progress, random_numbers, _ = shortening
     if progress[SIZE] < 3:
         return False
     lengths = _lengths(path, progress[SIZE])
     while progress[ATTEMPT] < len(random_numbers) and progress[FAILURES] < MAX_FAILURES:
-        first_position, second_position = (
-            random_numbers[progress[ATTEMPT], 0] * lengths[-1],
-            random_numbers[progress[ATTEMPT], 1] * lengths[-1],
-        )
+        first_position = random_numbers[progress[ATTEMPT], 0] * lengths[-1]
+        second_position = random_numbers[progress[ATTEMPT], 1] * lengths[-1]
         low, high = min(first_position, second_position), max(first_position, second_position)
         progress[ATTEMPT] += 1
         progress[FIRST] = _write_point(path, lengths, low, edge[0])
         progress[LAST] = _write_point(path, lengths, high, edge[1])
         if (
             progress[FIRST] != progress[LAST]
-            and _distance(edge[0], edge[1]) <= high - low - MIN_SHORTCUT_GAIN * lengths[-1]
+            and joint_distance(edge[0], edge[1]) <= high - low - MIN_SHORTCUT_GAIN * lengths[-1]
         ):
             return True
         progress[FAILURES] += 1
@@ -197,6 +190,7 @@ def _next_shortcut(shortening: Shortening) -> bool:
 
 @njit(cache=True, nogil=True)
 def _apply_shortcut_verdict(shortening: Shortening, is_free: bool) -> None:
+    """Replaces the vertices between the ends of a free shortcut by these ends."""
     path, edge, progress, _, _ = shortening
     if not is_free:
         progress[FAILURES] += 1
@@ -215,6 +209,7 @@ def _apply_shortcut_verdict(shortening: Shortening, is_free: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def _next_pull(shortening: Shortening) -> bool:
+    """Proposes the edge to the next pulled vertex with sufficient gain; returns False after the last round."""
     path, edge, progress, _, min_gain = shortening
     if progress[CHECKS_SECOND_EDGE]:
         return True
@@ -231,13 +226,8 @@ def _next_pull(shortening: Shortening) -> bool:
             for joint in range(len(vertex)):
                 on_line = before[joint] + fraction * (after[joint] - before[joint])
                 edge[0, joint], edge[1, joint] = before[joint], 0.5 * (vertex[joint] + on_line)
-            gain = (
-                _distance(before, vertex)
-                + _distance(vertex, after)
-                - _distance(before, edge[1])
-                - _distance(edge[1], after)
-            )
-            if gain >= min_gain[0]:
+            length = joint_distance(before, vertex) + joint_distance(vertex, after)
+            if length - joint_distance(before, edge[1]) - joint_distance(edge[1], after) >= min_gain[0]:
                 return True
         elif progress[HAS_MOVED]:
             progress[PULL_ROUND], progress[VERTEX], progress[HAS_MOVED] = progress[PULL_ROUND] + 1, 0, 0
@@ -248,6 +238,7 @@ def _next_pull(shortening: Shortening) -> bool:
 
 @njit(cache=True, nogil=True)
 def _apply_pull_verdict(shortening: Shortening, is_free: bool) -> None:
+    """Proposes the second edge of a pulled vertex if the first edge is free; moves the vertex if both are free."""
     path, edge, progress, _, _ = shortening
     if is_free and not progress[CHECKS_SECOND_EDGE]:
         edge[0], edge[1], progress[CHECKS_SECOND_EDGE] = edge[1], path[progress[VERTEX] + 1], 1
@@ -259,7 +250,7 @@ def _apply_pull_verdict(shortening: Shortening, is_free: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def begin(shortening: Shortening) -> None:
-    """Starts the shortening of a new path; without random numbers, vertices are only dropped."""
+    """Starts the shortening of a new path; without random numbers, only the dropping stage runs."""
     _enter_stage(shortening, DROPS)
 
 
@@ -271,20 +262,19 @@ def shorten_in(
 
     Args:
         shortening: Path, initialised by `begin`; changed in place.
-        edges: Mapping and step of the edge checks.
-        memory: Remembered edges; changed in place.
+        edges: Step of the edge checks, and map from the group to the robot.
+        memory: Cached edge checks; changed in place.
         verdict: FREE or BLOCKED for the edge on which the last call returned UNDECIDED; otherwise UNKNOWN.
-        world: Result of `arguments`.
+        *world: Arrays from `compiled_collision.arguments`.
 
     Returns:
-        FINISHED. UNDECIDED: the proposed edge needs an exact check. PAUSED: the caller checks the clock and calls
-        again.
+        FINISHED: no stage is left. UNDECIDED: the proposed edge needs an exact check. PAUSED: the caller checks the
+        clock and calls again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(edges)
-    edge_memory = borrowed(memory)
     status = _shorten_in(
-        borrowed(shortening), borrowed(edges), edge_memory, verdict, bodies, borrowed(edge), borrowed(workspace)
+        borrowed(shortening), borrowed(edges), borrowed(memory), verdict, bodies, borrowed(edge), borrowed(workspace)
     )
     release(workspace, edge)
     return status

@@ -2,8 +2,8 @@
 """Compiled time-optimal path parameterization (TOPP-RA) of a path with parabolic blends, and its moving average.
 
 The path is divided into intervals with a linear tangent q' and a constant curvature q'' over path position s, and with
-a constant path acceleration u. The joint acceleration q' u + q'' x, with x the squared path speed, is then linear in
-each interval, so that its limits hold everywhere if they hold at both ends.
+a constant path acceleration u. The joint acceleration q' u + q'' x, with x the squared path speed, is then linear over
+s in each interval. Its limits therefore hold everywhere if they hold at both ends.
 
 Source: H. Pham, Q.-C. Pham, "A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis",
 IEEE Transactions on Robotics 34 (2018).
@@ -21,20 +21,21 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_curves import curve_values, quintic_coefficients
 
 _ZERO_TANGENT = 1.0e-10  # a joint with a smaller tangent does not bound the path acceleration
-_NODE = 0.7745966692414834  # outer node of Gauss quadrature with three nodes, exact for polynomials of degree 5
+_NODE = 0.7745966692414834  # sqrt(3 / 5): outer node of Gauss quadrature with three nodes, exact up to degree 5
 GRID_STEP = 0.02  # maximum length of an interval [rad or m]
 MIN_INTERVALS = 12  # minimum number of intervals per straight piece or blend
-MIN_JUMP = 0.05  # larger acceleration jumps get their own trajectory point; fraction of the limit
-SAMPLES_PER_SEGMENT = 24
+MIN_JUMP = 0.05  # larger acceleration jumps get a trajectory point; fraction of the limit
+SAMPLES_PER_SEGMENT = 24  # sample intervals per segment in the check of the limits
 MIN_BLEND_COSINE = -0.9  # minimum cosine between two edges with a blend; the motion stops at sharper reversals
 MIN_BLEND = 1.0e-3  # minimum blend size [rad or m]
+MAX_BLEND_FRACTION = 0.45  # maximum blend size as a fraction of an edge, which has a blend at both ends
 
 
 class PathPieces(NamedTuple):
     """A path of m parabolas.
 
     Attributes:
-        breaks: Path positions at the ends of the parabolas, shape (m + 1,).
+        breaks: Path position at the ends of the parabolas, shape (m + 1,).
         points, tangents: Joint positions and tangents at the start of each parabola, shape (m, joints).
         curvatures: Curvature of each parabola, shape (m, joints).
     """
@@ -70,7 +71,8 @@ class PathMotion(NamedTuple):
 def _bounds(squared_speed: float, rows: Array, limits: Array) -> tuple[float, float, int, int]:
     """Returns the minimum and maximum path acceleration at a squared speed, and the active rows (-1 if none).
 
-    Row (a, b) of `rows` with limit c means -c <= a u + b x <= c; its upper half is row k, its lower half row k + n.
+    Row k of `rows` is (a, b) and means -c <= a u + b x <= c, with c the limit of the row. Active row k stands for the
+    limit c, active row k + n for the limit -c.
     """
     min_value, max_value, low_row, high_row = -np.inf, np.inf, -1, -1
     count = len(limits)
@@ -91,11 +93,11 @@ def _bounds(squared_speed: float, rows: Array, limits: Array) -> tuple[float, fl
 
 
 @njit(cache=True, nogil=True)
-def _line(row: int, rows: Array, limits: Array) -> tuple[float, float]:
-    """Returns the offset and the slope over x of a row's bound on u."""
+def _line(active_row: int, rows: Array, limits: Array) -> tuple[float, float]:
+    """Returns the bound of an active row on u as offset and slope over x."""
     count = len(limits)
-    k = row % count
-    limit = limits[k] if row < count else -limits[k]
+    k = active_row % count
+    limit = limits[k] if active_row < count else -limits[k]
     return limit / rows[k, 0], -rows[k, 1] / rows[k, 0]
 
 
@@ -103,8 +105,8 @@ def _line(row: int, rows: Array, limits: Array) -> tuple[float, float]:
 def _fastest_start(ceiling: float, step: float, next_max_square: float, rows: Array, limits: Array) -> float:
     """Returns the maximum squared speed at the start of an interval that allows a valid speed at its end.
 
-    The width of the allowed range of u is concave in x and not negative at 0. Newton's method from the right therefore
-    finds its root in at most as many steps as there are pairs of active rows.
+    The width of the allowed range of u is concave in x and not negative at x = 0. Newton's method from the right
+    therefore finds the root of the width in at most as many steps as there are pairs of active rows.
 
     Args:
         ceiling: Upper bound of the squared speed.
@@ -139,7 +141,7 @@ def _fastest_start(ceiling: float, step: float, next_max_square: float, rows: Ar
 
 @njit(cache=True, nogil=True)
 def _constrain(rows: Array, tangent: Array, end_tangent: Array, curvature: Array, step: float) -> None:
-    """Writes the acceleration constraints at both ends of an interval, where x at the end is x + step u."""
+    """Writes the acceleration constraints at both ends of an interval; x at the end is x + step u."""
     joints = len(tangent)
     for j in range(joints):
         rows[j, 0], rows[j, 1] = tangent[j], curvature[j]
@@ -164,7 +166,6 @@ def optimal_speeds(
     limits = np.concatenate((acceleration, acceleration))
     rows = np.empty((2 * joints, 2))
     max_squares = np.zeros(count + 1)
-    ceiling = np.inf
     for i in range(count - 1, -1, -1):
         ceiling = np.inf
         for j in range(joints):
@@ -184,9 +185,9 @@ def optimal_speeds(
 
 
 @njit(cache=True, nogil=True)
-def _trapezoid(length: float, top: float, path_acceleration: float) -> tuple[Array, Array, Array]:
+def _trapezoid(length: float, max_speed: float, path_acceleration: float) -> tuple[Array, Array, Array]:
     """Returns grid, path speeds and path accelerations of a trapezoidal profile along a straight line."""
-    ramp = min(top * top / (2.0 * path_acceleration), 0.5 * length)
+    ramp = min(max_speed * max_speed / (2.0 * path_acceleration), 0.5 * length)
     speed = np.sqrt(2.0 * path_acceleration * ramp)
     if length - 2.0 * ramp <= 1e-9 * length:
         return (
@@ -203,7 +204,7 @@ def _trapezoid(length: float, top: float, path_acceleration: float) -> tuple[Arr
 
 @njit(cache=True, nogil=True)
 def _grid(breaks: Array, max_length: float, min_count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Returns the ends of the intervals and the index of the piece of each interval."""
+    """Returns the path positions at the ends of the intervals, and the piece of each interval."""
     pieces = len(breaks) - 1
     counts = np.empty(pieces, dtype=np.int64)
     for piece in range(pieces):
@@ -221,6 +222,7 @@ def _grid(breaks: Array, max_length: float, min_count: int) -> tuple[Array, NDAr
 
 @njit(cache=True, nogil=True)
 def _tangents(pieces: PathPieces, positions: Array, piece_indices: NDArray[np.int64]) -> Array:
+    """Returns the tangents q' at path positions on the given pieces, shape (k, joints)."""
     result = np.empty((len(piece_indices), pieces.points.shape[1]))
     for i in range(len(piece_indices)):
         piece = piece_indices[i]
@@ -249,12 +251,12 @@ def fastest_motion(
         )
         piece_indices = np.zeros(len(path_accelerations), dtype=np.int64)
         starts, ends = _tangents(pieces, grid[:-1], piece_indices), _tangents(pieces, grid[1:], piece_indices)
+        curvatures = pieces.curvatures[piece_indices]
     else:
         grid, piece_indices = _grid(pieces.breaks, max_length, min_count)
         starts, ends = _tangents(pieces, grid[:-1], piece_indices), _tangents(pieces, grid[1:], piece_indices)
-        speeds, path_accelerations = optimal_speeds(
-            np.diff(grid), starts, ends, pieces.curvatures[piece_indices], velocity, acceleration
-        )
+        curvatures = pieces.curvatures[piece_indices]
+        speeds, path_accelerations = optimal_speeds(np.diff(grid), starts, ends, curvatures, velocity, acceleration)
     count = len(path_accelerations)
     times, areas, jumps = np.zeros(count + 1), np.zeros((count + 1, joints)), np.zeros(count + 1)
     motion = PathMotion(grid, speeds, times, path_accelerations, piece_indices, areas, jumps)
@@ -265,11 +267,8 @@ def fastest_motion(
             areas[i + 1, j] = areas[i, j] + _area(pieces, motion, i, duration, j)
             if i > 0:
                 squared_speed = speeds[i] * speeds[i]
-                before = (
-                    ends[i - 1, j] * path_accelerations[i - 1]
-                    + pieces.curvatures[piece_indices[i - 1], j] * squared_speed
-                )
-                after = starts[i, j] * path_accelerations[i] + pieces.curvatures[piece_indices[i], j] * squared_speed
+                before = ends[i - 1, j] * path_accelerations[i - 1] + curvatures[i - 1, j] * squared_speed
+                after = starts[i, j] * path_accelerations[i] + curvatures[i, j] * squared_speed
                 jumps[i] = max(jumps[i], abs(after - before) / acceleration[j])
     return motion
 
@@ -281,30 +280,25 @@ def _point(pieces: PathPieces, motion: PathMotion, interval: int, offset: float,
     speed = motion.speeds[interval] + offset * path_acceleration
     along = (motion.grid[interval] - pieces.breaks[piece]) + offset * (speed - 0.5 * offset * path_acceleration)
     tangent, curvature = pieces.tangents[piece, joint], pieces.curvatures[piece, joint]
-    return (
-        pieces.points[piece, joint] + along * (tangent + 0.5 * along * curvature),
-        (tangent + along * curvature) * speed,
-    )
+    position = pieces.points[piece, joint] + along * (tangent + 0.5 * along * curvature)
+    return position, (tangent + along * curvature) * speed
 
 
 @njit(cache=True, nogil=True)
 def _area(pieces: PathPieces, motion: PathMotion, interval: int, offset: float, joint: int) -> float:
-    """Returns the integral of a joint position over the first `offset` seconds of an interval."""
+    """Returns the exact integral of a joint position (degree 4 in time) over the first `offset` seconds."""
     half = 0.5 * offset
-    return (
-        offset
-        / 18.0
-        * (
-            5.0 * _point(pieces, motion, interval, half * (1.0 - _NODE), joint)[0]
-            + 8.0 * _point(pieces, motion, interval, half, joint)[0]
-            + 5.0 * _point(pieces, motion, interval, half * (1.0 + _NODE), joint)[0]
-        )
-    )
+    first = _point(pieces, motion, interval, half * (1.0 - _NODE), joint)[0]
+    middle = _point(pieces, motion, interval, half, joint)[0]
+    last = _point(pieces, motion, interval, half * (1.0 + _NODE), joint)[0]
+    return offset / 18.0 * (5.0 * first + 8.0 * middle + 5.0 * last)
 
 
 @njit(cache=True, nogil=True)
-def averaged(pieces: PathPieces, motion: PathMotion, times: Array, window: float) -> tuple[Array, Array, Array]:
-    """Returns positions, velocities and accelerations, averaged over the window before each time.
+def moving_average(pieces: PathPieces, motion: PathMotion, times: Array, window: float) -> tuple[Array, Array, Array]:
+    """Returns joint positions, velocities and accelerations, averaged over the window before each time.
+
+    With A the integral of the positions, the averaged position is (A(t) - A(t - window)) / window.
 
     Args:
         pieces: Parabolas of the path.
@@ -315,18 +309,18 @@ def averaged(pieces: PathPieces, motion: PathMotion, times: Array, window: float
     joints = pieces.points.shape[1]
     result = np.zeros((3, len(times), joints))
     count, end = len(motion.path_accelerations), motion.times[-1]
-    for side, sign in ((0.0, 1.0), (window, -1.0)):
+    for delay, sign in ((0.0, 1.0), (window, -1.0)):
         interval = 0
         for k in range(len(times)):
-            time = times[k] - side
-            inner = min(max(time, 0.0), end)
-            while interval < count - 1 and inner >= motion.times[interval + 1]:
+            time = times[k] - delay
+            clipped_time = min(max(time, 0.0), end)
+            while interval < count - 1 and clipped_time >= motion.times[interval + 1]:
                 interval += 1
-            offset = inner - motion.times[interval]
+            offset = clipped_time - motion.times[interval]
             for j in range(joints):
                 position, velocity = _point(pieces, motion, interval, offset, j)
                 area = motion.areas[interval, j] + _area(pieces, motion, interval, offset, j)
-                result[0, k, j] += sign * (area + (time - inner) * position)
+                result[0, k, j] += sign * (area + (time - clipped_time) * position)
                 result[1, k, j] += sign * position
                 if 0.0 < time < end:
                     result[2, k, j] += sign * velocity
@@ -336,13 +330,13 @@ def averaged(pieces: PathPieces, motion: PathMotion, times: Array, window: float
 
 @njit(cache=True, nogil=True)
 def _bound_of_cubic(a: float, b: float, c: float, d: float) -> float:
-    """Returns a bound of |a + b t + c t^2 + d t^3| for 0 <= t <= 1: the maximum of its Bernstein coefficients."""
+    """Returns a bound of |a + b t + c t^2 + d t^3| for 0 <= t <= 1: the maximum Bernstein coefficient."""
     return max(abs(a), abs(a + b / 3.0), abs(a + 2.0 * b / 3.0 + c / 3.0), abs(a + b + c + d))
 
 
 @njit(cache=True, nogil=True)
 def _bound_of_quartic(a: float, b: float, c: float, d: float, e: float) -> float:
-    """Returns a bound of |a + b t + c t^2 + d t^3 + e t^4| for 0 <= t <= 1, from its Bernstein coefficients."""
+    """Returns a bound of |a + b t + c t^2 + d t^3 + e t^4| for 0 <= t <= 1: the maximum Bernstein coefficient."""
     inner = max(abs(a + b / 4.0), abs(a + b / 2.0 + c / 6.0), abs(a + 3.0 * b / 4.0 + c / 2.0 + d / 4.0))
     return max(abs(a), inner, abs(a + b + c + d + e))
 
@@ -351,7 +345,7 @@ def _bound_of_quartic(a: float, b: float, c: float, d: float, e: float) -> float
 def max_limit_fractions(
     times: Array, coefficients: Array, velocity: Array, acceleration: Array, samples: int
 ) -> tuple[float, float]:
-    """Returns the maximum velocity and acceleration along a curve of quintics, as fractions of the limits.
+    """Returns the maximum velocity and acceleration at samples of a curve of quintics, as fractions of the limits.
 
     Args:
         times: Times of the points, shape (n,) [s].
@@ -368,16 +362,16 @@ def max_limit_fractions(
             c1, c2, c3 = coefficients[i, 1, j], coefficients[i, 2, j], coefficients[i, 3, j]
             c4, c5 = coefficients[i, 4, j], coefficients[i, 5, j]
             t2, t3, t4, t5 = 2.0 * c2 * span, 3.0 * c3 * span**2, 4.0 * c4 * span**3, 5.0 * c5 * span**4
-            max_speed = _bound_of_quartic(c1, t2, t3, t4, t5)
-            max_rate = _bound_of_cubic(t2, 2.0 * t3, 3.0 * t4, 4.0 * t5) / span
-            if max_speed <= velocity_fraction * velocity[j] and max_rate <= acceleration_fraction * acceleration[j]:
-                continue  # no sample can exceed the maximum so far
+            max_acceleration = _bound_of_cubic(t2, 2.0 * t3, 3.0 * t4, 4.0 * t5) / span
+            is_slower = _bound_of_quartic(c1, t2, t3, t4, t5) <= velocity_fraction * velocity[j]
+            if is_slower and max_acceleration <= acceleration_fraction * acceleration[j]:
+                continue  # no sample of this segment can exceed the maximum so far
             for k in range(samples + 1):
                 t = k * step
-                speed = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
-                rate = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
-                velocity_fraction = max(velocity_fraction, abs(speed) / velocity[j])
-                acceleration_fraction = max(acceleration_fraction, abs(rate) / acceleration[j])
+                first_derivative = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
+                second_derivative = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
+                velocity_fraction = max(velocity_fraction, abs(first_derivative) / velocity[j])
+                acceleration_fraction = max(acceleration_fraction, abs(second_derivative) / acceleration[j])
     return velocity_fraction, acceleration_fraction
 
 
@@ -385,9 +379,9 @@ def max_limit_fractions(
 def blended_pieces(vertices: Array, blends: Array) -> PathPieces:
     """Returns the straight pieces and the parabolic blends of a polyline.
 
-    The blend size d is the distance from the vertex at which the parabola leaves the line. Over its length 2 d, the
-    tangent changes linearly from the unit direction u before the vertex to the unit direction v after the vertex. The
-    parabola passes the vertex at a distance of d |u - v| / 4.
+    The blend size d is the distance from the vertex at which the parabola leaves the line. Over the length 2 d of the
+    blend, the tangent changes linearly from the unit direction u before the vertex to the unit direction v after the
+    vertex. The parabola passes the vertex at a distance of d |u - v| / 4.
 
     Args:
         vertices: Polyline, shape (n, joints), n > 1.
@@ -424,7 +418,7 @@ def blended_pieces(vertices: Array, blends: Array) -> PathPieces:
 
 @njit(cache=True, nogil=True)
 def spread_times(requested: Array, end: float, max_period: float, min_gap: float) -> Array:
-    """Returns times from 0 to `end`: requested times, unless too close to each other, and uniform times in between.
+    """Returns times from 0 to `end`: requested times, unless too close to another, and uniform times in between.
 
     Args:
         requested: Requested times in any order, shape (m,) [s].
@@ -469,9 +463,9 @@ def timed_points(
         blends: Blend sizes at the inner vertices, above 0, shape (n - 2,).
         velocity: Joint velocity limits, above 0, shape (joints,).
         acceleration: Joint acceleration limits, above 0, shape (joints,).
-        window: Averaging window [s].
+        window: Length of the averaging window [s].
         max_period: Maximum time between two points [s].
-        min_gap: Minimum time between two points [s].
+        min_gap: Minimum time between the points at acceleration jumps [s].
 
     Returns:
         Times in whole nanoseconds, shape (m,), and positions, velocities and accelerations, shape (3, m, joints).
@@ -482,7 +476,7 @@ def timed_points(
     end = motion.times[-1] + window
     requested = np.concatenate((jumps, jumps + window, np.array([window, end - window])))
     times = spread_times(requested, end, max_period, min_gap)
-    positions, velocities, accelerations = averaged(pieces, motion, times, window)
+    positions, velocities, accelerations = moving_average(pieces, motion, times, window)
     positions[0], positions[-1] = vertices[0], vertices[-1]
     velocities[0], velocities[-1] = 0.0, 0.0
     accelerations[0], accelerations[-1] = 0.0, 0.0
@@ -491,14 +485,14 @@ def timed_points(
         times, coefficients, velocity, acceleration, SAMPLES_PER_SEGMENT
     )
     factor = max(1.0, velocity_fraction, np.sqrt(acceleration_fraction))
-    slower = np.rint(times * factor * 1e9) / 1e9
-    values = curve_values(times, coefficients, slower / factor, 3)
+    slowed_times = np.rint(times * factor * 1e9) / 1e9
+    values = curve_values(times, coefficients, slowed_times / factor, 3)
     values[0, 0], values[0, -1] = vertices[0], vertices[-1]
     values[1, 0], values[1, -1] = 0.0, 0.0
     values[2, 0], values[2, -1] = 0.0, 0.0
     values[1] /= factor
     values[2] /= factor * factor
-    return slower, values
+    return slowed_times, values
 
 
 @njit(cache=True, nogil=True)
@@ -517,7 +511,7 @@ def max_blends(vertices: Array, deviation: float) -> Array:
         if (before * after).sum() < MIN_BLEND_COSINE:
             continue
         direction_change = max(np.sqrt(((after - before) ** 2).sum()), 1e-9)
-        size = min(0.45 * length, 0.45 * next_length, 4.0 * deviation / direction_change)
+        size = min(MAX_BLEND_FRACTION * length, MAX_BLEND_FRACTION * next_length, 4.0 * deviation / direction_change)
         if size >= MIN_BLEND:
             result[index] = size
     return result
@@ -525,7 +519,7 @@ def max_blends(vertices: Array, deviation: float) -> Array:
 
 @njit(cache=True, nogil=True)
 def blend_samples(start: Array, waypoint: Array, end: Array, size: float, step: float) -> Array:
-    """Returns samples of a blend, shape (m, joints).
+    """Returns samples of the parabola of a blend, see `blended_pieces`; shape (m, joints).
 
     Args:
         start: Vertex before the blended waypoint, shape (joints,).
