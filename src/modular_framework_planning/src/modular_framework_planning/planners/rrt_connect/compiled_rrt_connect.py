@@ -5,14 +5,14 @@ Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planni
 to the next sample and the other tree connects to it, as in the same authors' "An efficient approach to path planning
 using balanced bidirectional RRT search", CMU-RI-TR-05-34: balanced trees explore the narrower end as densely as the
 other. A state whose extension was blocked accepts only nearby samples, as in Yershova, Jaillet, Simeon, LaValle:
-Dynamic-domain RRTs, ICRA 2005. Otherwise an enclosed tree keeps extending into the same obstacle.
+Dynamic-domain RRTs, ICRA 2005. Without this rule, an enclosed tree keeps extending into the same obstacle.
 
-With a length bound the search accepts only shorter paths, as in Hauser, Zhou: Asymptotically optimal planning by
-feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016: each sample gets a random maximum path length, and
-only states that respect this length can be its parent.
+With a length bound, the search accepts only shorter paths, as in Hauser, Zhou: Asymptotically optimal planning by
+feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016. Each sample gets a random maximum path length; only
+states that respect this length can become the sample's parent.
 
 The loop returns to the interpreter for new samples, for larger trees, for an edge that the compiled check leaves
-undecided, and regularly to read the clock.
+undecided, and regularly for a check of the clock.
 """
 
 from __future__ import annotations
@@ -42,8 +42,12 @@ from modular_framework_planning.geometry.spatial import Array
 
 # Return values of `grow`
 FOUND, NEEDS_SAMPLES, NEEDS_CAPACITY, UNDECIDED, PAUSED, LIMIT_REACHED = range(6)
-EXTEND, CONNECT = 0, 1
+# Indices into Trees.cursor: next sample, growing tree, phase, and state to extend
+SAMPLE, TREE, PHASE, NEAREST = range(4)
+EXTEND, CONNECT = range(2)  # phases
 NEAREST_UNKNOWN = -1  # the state nearest to the target is not known yet
+# Indices into Trees.counts: edge checks, extensions, maximum number of extensions, and edge checks at the next pause
+EDGE_CHECKS, EXTENSIONS, EXTENSION_LIMIT, NEXT_PAUSE = range(4)
 EDGES_PER_CALL = 200  # the caller checks the time and cancellation after this number of edge checks
 
 
@@ -56,11 +60,9 @@ class Trees(NamedTuple):
         blocked: Whether an extension from each state was blocked, shape (2, capacity).
         lengths: Weighted path length from the root to each state, shape (2, capacity).
         sizes: Number of states per tree, shape (2,).
-        cursor: Index of the next sample, index of the growing tree, phase (EXTEND or CONNECT), and index of the state
-            that grows (or NEAREST_UNKNOWN), shape (4,).
+        cursor: Position of the search, at the indices SAMPLE to NEAREST, shape (4,).
         target: State that the tree grows towards, shape (joints,).
-        counts: Number of edge checks, number of extensions, extension limit, and number of edge checks at the next
-            pause, shape (4,).
+        counts: Counters and limits, at the indices EDGE_CHECKS to NEXT_PAUSE, shape (4,).
     """
 
     states: Array
@@ -74,14 +76,14 @@ class Trees(NamedTuple):
 
 
 class Space(NamedTuple):
-    """The joint space of a group with a weighted metric; all lengths below are weighted.
+    """The joint space of a group with a weighted metric; all lengths are weighted [rad or m].
 
     Attributes:
         weights: Joint weights of the metric, shape (joints,).
         max_extension: Maximum length of an extension.
         domain_radius: Maximum distance at which a blocked state is extended to a sample.
         length_bound: Upper bound of the path length; infinite to accept any path.
-        edges: Mapping and step of the edge checks.
+        edges: Step of the edge checks, and map from the group to the robot.
     """
 
     weights: Array
@@ -93,29 +95,29 @@ class Space(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def _squared_distance(first: Array, second: Array, weights: Array) -> float:
-    length = 0.0
+    square = 0.0
     for joint in range(len(first)):
         gap = weights[joint] * (second[joint] - first[joint])
-        length += gap * gap
-    return length
+        square += gap * gap
+    return square
 
 
 @njit(cache=True, nogil=True)
 def _nearest(
     states: Array, lengths: Array, tree: int, size: int, target: Array, weights: Array, max_length: float
 ) -> int:
-    """Returns the index of the tree's state nearest to a joint vector.
+    """Returns the index of the tree's state nearest to a target, -1 if no state qualifies.
 
-    Only states whose path from the root to the joint vector is no longer than `max_length` qualify; -1 if none does.
+    A state qualifies if the path from the root through the state to the target is not longer than `max_length`.
     """
-    best, nearest, joints = np.inf, -1, len(target)
+    min_square, nearest, joints = np.inf, -1, len(target)
     for index in range(size):
-        length = 0.0
+        square = 0.0
         for joint in range(joints):
             gap = weights[joint] * (target[joint] - states[tree, index, joint])
-            length += gap * gap
-        if length < best and (max_length == np.inf or lengths[tree, index] + np.sqrt(length) <= max_length):
-            best, nearest = length, index
+            square += gap * gap
+        if square < min_square and (max_length == np.inf or lengths[tree, index] + np.sqrt(square) <= max_length):
+            min_square, nearest = square, index
     return nearest
 
 
@@ -123,20 +125,21 @@ def _nearest(
 def _distance_to_root(
     states: Array, parents: NDArray[np.int64], tree: int, size: int, target: Array, weights: Array
 ) -> float:
-    """Returns the weighted distance from a joint vector to the nearest root of a tree."""
-    best = np.inf
+    """Returns the weighted distance from a joint vector to the nearest root of a tree; the roots are stored first."""
+    min_square = np.inf
     for index in range(size):
         if parents[tree, index] >= 0:
             break
-        best = min(best, _squared_distance(states[tree, index], target, weights))
-    return np.sqrt(best)
+        min_square = min(min_square, _squared_distance(states[tree, index], target, weights))
+    return np.sqrt(min_square)
 
 
 @njit(cache=True, nogil=True)
 def _max_length_to_sample(trees: Trees, space: Space, tree: int, sample: Array) -> float:
     """Returns the maximum path length from the root of a tree to a sample; -1 if every path through it is too long.
 
-    The sample's last value, from 0 to 1, interpolates between the straight distance and the length the bound leaves.
+    The last value r of the sample, from 0 to 1, gives d + r (bound - d - e), with d and e the distances of the sample
+    from the roots of this tree and of the other tree.
     """
     if space.length_bound == np.inf:
         return np.inf
@@ -152,8 +155,8 @@ def write_step(start: Array, target: Array, space: Space, out: Array) -> bool:
     """Writes the end of an extension towards a target, at most `max_extension` away from the start.
 
     Args:
-        start: Joint vector of the group.
-        target: Joint vector to extend towards.
+        start: Joint vector of the group, shape (joints,) [rad or m].
+        target: Joint vector to extend towards, shape (joints,) [rad or m].
         space: Joint space of the search.
         out: Output joint vector, shape (joints,).
 
@@ -174,15 +177,15 @@ def grow(trees: Trees, space: Space, samples: Array, verdict: int, *world: NDArr
     Args:
         trees: State of the search; changed in place.
         space: Joint space of the search.
-        samples: Random states, shape (n, joints); with a length bound, shape (n, joints + 1), where the last column
-            holds random numbers from 0 to 1.
+        samples: Random states, shape (n, joints); with a length bound, shape (n, joints + 1) with random numbers from
+            0 to 1 in the last column.
         verdict: FREE or BLOCKED for the edge on which the last call returned UNDECIDED; otherwise UNKNOWN.
-        world: Result of `arguments`.
+        *world: Arrays from `compiled_collision.arguments`.
 
     Returns:
         FOUND: the last states of both trees are equal. NEEDS_SAMPLES: all samples are used. NEEDS_CAPACITY: a tree is
-        full. LIMIT_REACHED: the extension limit is used up. UNDECIDED: the next extension towards `target` needs an
-        exact check. PAUSED: the caller checks the clock and calls again.
+        full. LIMIT_REACHED: the maximum number of extensions is reached. UNDECIDED: the next extension towards `target`
+        needs an exact check. PAUSED: the caller checks the clock and calls again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
@@ -195,65 +198,65 @@ def grow(trees: Trees, space: Space, samples: Array, verdict: int, *world: NDArr
 def _grow(
     trees: Trees, space: Space, samples: Array, verdict: int, world: World, edge: Samples, workspace: Workspace
 ) -> int:
-    """Implements `grow` with preallocated working memory; arrays are passed without owner (see `borrowed`)."""
+    """Implements `grow` with given working memory and borrowed arrays."""
     states, parents, blocked, lengths, sizes, cursor, target, counts = trees
     state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
     while True:
-        if counts[0] >= counts[3] and verdict == UNKNOWN:
+        if counts[EDGE_CHECKS] >= counts[NEXT_PAUSE] and verdict == UNKNOWN:
             return PAUSED
-        if cursor[3] == NEAREST_UNKNOWN:
-            if cursor[2] == EXTEND:
-                if counts[1] == counts[2]:
+        if cursor[NEAREST] == NEAREST_UNKNOWN:
+            if cursor[PHASE] == EXTEND:
+                if counts[EXTENSIONS] == counts[EXTENSION_LIMIT]:
                     return LIMIT_REACHED
-                if cursor[0] == len(samples):
+                if cursor[SAMPLE] == len(samples):
                     return NEEDS_SAMPLES
-                cursor[1] = 0 if sizes[0] <= sizes[1] else 1
-                target[:] = samples[cursor[0], : len(target)]
-                max_length = _max_length_to_sample(trees, space, cursor[1], samples[cursor[0]])
-                cursor[0] += 1
+                cursor[TREE] = 0 if sizes[0] <= sizes[1] else 1
+                target[:] = samples[cursor[SAMPLE], : len(target)]
+                max_length = _max_length_to_sample(trees, space, cursor[TREE], samples[cursor[SAMPLE]])
+                cursor[SAMPLE] += 1
             else:  # connect to the last state of the other tree
-                other = 1 - cursor[1]
+                other = 1 - cursor[TREE]
                 max_length = space.length_bound - lengths[other, sizes[other] - 1]
-            tree = cursor[1]
-            cursor[3] = _nearest(states, lengths, tree, sizes[tree], target, space.weights, max_length)
-            if cursor[3] < 0:  # no state qualifies; cursor[3] is NEAREST_UNKNOWN again
-                counts[1] += cursor[2] == EXTEND
-                cursor[2] = EXTEND
+            tree = cursor[TREE]
+            cursor[NEAREST] = _nearest(states, lengths, tree, sizes[tree], target, space.weights, max_length)
+            if cursor[NEAREST] < 0:  # no state qualifies; cursor[NEAREST] is NEAREST_UNKNOWN again
+                counts[EXTENSIONS] += cursor[PHASE] == EXTEND
+                cursor[PHASE] = EXTEND
                 continue
-            if cursor[2] == EXTEND:
-                nearest = states[tree, cursor[3]]
+            if cursor[PHASE] == EXTEND:
+                nearest = states[tree, cursor[NEAREST]]
                 if (
-                    blocked[tree, cursor[3]]
+                    blocked[tree, cursor[NEAREST]]
                     and _squared_distance(nearest, target, space.weights) > space.domain_radius**2
                 ):
-                    cursor[3] = NEAREST_UNKNOWN
+                    cursor[NEAREST] = NEAREST_UNKNOWN
                     continue
-                counts[1] += 1
-        tree = cursor[1]
+                counts[EXTENSIONS] += 1
+        tree = cursor[TREE]
         if sizes[tree] == parents.shape[1]:
             return NEEDS_CAPACITY
-        start = states[tree, cursor[3]]
+        start = states[tree, cursor[NEAREST]]
         reached = write_step(start, target, space, state)
         if verdict == UNKNOWN:
-            counts[0] += 1
+            counts[EDGE_CHECKS] += 1
             verdict = check_edge(space.edges, world, start, state, edge, no_rows, workspace)
             if verdict == UNKNOWN:
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN
         if is_free:
-            states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, cursor[3]
+            states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, cursor[NEAREST]
             step = np.sqrt(_squared_distance(start, state, space.weights))
-            lengths[tree, sizes[tree]] = lengths[tree, cursor[3]] + step
+            lengths[tree, sizes[tree]] = lengths[tree, cursor[NEAREST]] + step
             sizes[tree] += 1
-        elif cursor[2] == EXTEND:
-            blocked[tree, cursor[3]] = True
-        if cursor[2] == EXTEND:
-            cursor[3] = NEAREST_UNKNOWN
+        elif cursor[PHASE] == EXTEND:
+            blocked[tree, cursor[NEAREST]] = True
+        if cursor[PHASE] == EXTEND:
+            cursor[NEAREST] = NEAREST_UNKNOWN
             if is_free:
-                cursor[1], cursor[2], target[:] = 1 - tree, CONNECT, state
+                cursor[TREE], cursor[PHASE], target[:] = 1 - tree, CONNECT, state
         elif not is_free:
-            cursor[2], cursor[3] = EXTEND, NEAREST_UNKNOWN
+            cursor[PHASE], cursor[NEAREST] = EXTEND, NEAREST_UNKNOWN
         elif reached:
             return FOUND
         else:
-            cursor[3] = sizes[tree] - 1
+            cursor[NEAREST] = sizes[tree] - 1

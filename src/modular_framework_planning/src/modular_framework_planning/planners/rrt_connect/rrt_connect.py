@@ -20,14 +20,20 @@ from modular_framework_planning.collision_detection.kernels.compiled_edges impor
 from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
+    EDGE_CHECKS,
     EDGES_PER_CALL,
     EXTEND,
+    EXTENSIONS,
     FOUND,
     LIMIT_REACHED,
+    NEAREST,
     NEAREST_UNKNOWN,
     NEEDS_CAPACITY,
     NEEDS_SAMPLES,
+    NEXT_PAUSE,
     PAUSED,
+    SAMPLE,
+    TREE,
     UNDECIDED,
     Space,
     Trees,
@@ -156,12 +162,12 @@ class RrtConnect:
     @property
     def checks(self) -> int:
         """Number of edge checks."""
-        return int(self._trees.counts[0])
+        return int(self._trees.counts[EDGE_CHECKS])
 
     @property
     def extensions(self) -> int:
         """Number of attempted extensions to random states."""
-        return int(self._trees.counts[1])
+        return int(self._trees.counts[EXTENSIONS])
 
     @property
     def tree_sizes(self) -> tuple[int, int]:
@@ -171,7 +177,7 @@ class RrtConnect:
     def grow(self) -> None:
         """Grows the trees until they meet or the search pauses; searches may grow in parallel threads."""
         if self._status != UNDECIDED:  # the round continues after an undecided edge
-            self._trees.counts[3] = self._trees.counts[0] + EDGES_PER_CALL
+            self._trees.counts[NEXT_PAUSE] = self._trees.counts[EDGE_CHECKS] + EDGES_PER_CALL
         self._status = grow(self._trees, self._space, self._samples, self._verdict, *self._world)
         self._verdict = UNKNOWN
 
@@ -196,7 +202,7 @@ class RrtConnect:
         elif self._status == NEEDS_SAMPLES:
             self._batches += 1
             self._samples = self._random_states() if self._space.length_bound == np.inf else self._states_within_bound()
-            self._trees.cursor[0] = 0
+            self._trees.cursor[SAMPLE] = 0
         return self._status != LIMIT_REACHED
 
     def add_counts(self, other: RrtConnect) -> None:
@@ -253,7 +259,7 @@ class RrtConnect:
 
     def _undecided_edge_is_free(self) -> bool:
         trees = self._trees
-        start, end = trees.states[trees.cursor[1], trees.cursor[3]], np.empty_like(trees.target)
+        start, end = trees.states[trees.cursor[TREE], trees.cursor[NEAREST]], np.empty_like(trees.target)
         write_step(start, trees.target, self._space, end)
         return self._problem.motion.edge_is_free(start, end, self._space.edges.step)
 
