@@ -58,7 +58,7 @@ from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.process_setup.garbage_collection import freeze_loaded_objects
 from modular_framework_planning.process_setup.many_threads import prepare
 
-# All endpoints by their names in MoveIt's parameters `capabilities` and `disable_capabilities`
+# Endpoints, by the names that MoveIt's parameters `capabilities` and `disable_capabilities` use
 CAPABILITIES = (
     Capability("move_group/MoveGroupPlanService", PlanService),
     Capability("move_group/MoveGroupCartesianPathService", CartesianPathService),
@@ -79,7 +79,7 @@ CAPABILITIES = (
 
 
 def build_context() -> MoveGroupContext:
-    """Reads the parameters and builds the shared parts; raises PlanningError for a missing or invalid parameter."""
+    """Builds the context of all endpoints; raises PlanningError for a missing or invalid parameter."""
     model = load_robot_model()
     kinematics = KinematicsPool(model, load_kinematics_settings())
     monitor = SceneMonitor(model, load_padding(model), settings_below("planning_scene_monitor", SceneMonitorSettings))
@@ -107,15 +107,15 @@ def build_context() -> MoveGroupContext:
 
 
 def advertise(context: MoveGroupContext) -> None:
-    """Starts all enabled endpoints."""
+    """Connects the monitors, the markers, the execution and all enabled endpoints."""
     context.monitor.listeners.append(context.markers.show_scene)
     context.monitor.connect()
     OctomapMonitor(context.monitor).connect()
     context.markers.show_scene(context.monitor.snapshot())
     publish_descriptions()
     context.execution.connect()
-    for adjustable in reconfigurations(context):
-        adjustable.connect()
+    for reconfiguration in reconfigurations(context):
+        reconfiguration.connect()
     rospy.on_shutdown(context.execution.close)
     rospy.on_shutdown(context.pipelines.close)
     for capability in chosen_capabilities(CAPABILITIES):

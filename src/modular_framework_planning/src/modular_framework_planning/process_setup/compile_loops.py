@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiles all numba kernels into numba's cache, so that no request and no launch waits for a compilation.
 
-The module calls each kernel with the argument types of the product, for a small robot and scene. Cached kernels are
-only loaded. Run the module once after the build:
+The module calls each kernel with the argument types that the product uses, for a small robot and scene. Cached kernels
+are only loaded. Run the module once after the build:
 python3 -m modular_framework_planning.process_setup.compile_loops
-Two processes then share the compilation. They compile only the kinematics twice, which the collision kernels inline.
+Two processes then share the compilation. Both compile the kinematics, which the collision kernels inline.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from modular_framework_planning.trajectory_processing import compiled_polylines,
 
 COLLISIONS = "collisions"
 """Command-line argument of the second process."""
-LINKS = 4
+LINKS = 4  # links of the robot
 MOTION_STEP = 0.05  # [rad]
 TETRAHEDRON = np.array(
     [
@@ -55,11 +55,11 @@ TETRAHEDRON = np.array(
 
 def compile_all() -> float:
     """Compiles all kernels, or loads them from the cache; returns the duration [s]."""
-    begun = time.monotonic()
+    start = time.monotonic()
     robot = _robot()
     _compile_motions(robot)
     _compile_collisions(robot)
-    return time.monotonic() - begun
+    return time.monotonic() - start
 
 
 def compile_in_two_processes() -> float:
@@ -68,18 +68,18 @@ def compile_in_two_processes() -> float:
     Raises:
         subprocess.CalledProcessError: The second process failed; its output contains the reason.
     """
-    begun = time.monotonic()
+    start = time.monotonic()
     make_saves_exclusive()
     with subprocess.Popen([sys.executable, "-m", f"{__package__}.compile_loops", COLLISIONS]) as collisions:
         try:
             _compile_motions(_robot())
-            code = collisions.wait()
+            exit_code = collisions.wait()
         finally:
             collisions.kill()
-    if code:
-        raise subprocess.CalledProcessError(code, collisions.args)
-    compile_all()  # loads all kernels and compiles missing ones
-    return time.monotonic() - begun
+    if exit_code:
+        raise subprocess.CalledProcessError(exit_code, collisions.args)
+    compile_all()  # loads all kernels and compiles missing kernels
+    return time.monotonic() - start
 
 
 def _compile_motions(robot: RobotModel) -> None:
@@ -94,7 +94,7 @@ def _compile_collisions(robot: RobotModel) -> None:
     """Compiles the kernels that need a scene: octomaps, collision checks and searches."""
     build_sphere_tree(TETRAHEDRON)
     _check_motions(_scene(robot, _voxels()))
-    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes; meshes need a slow import
+    links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes, because meshes need a slow import
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
 
 
@@ -115,7 +115,7 @@ def _robot() -> RobotModel:
 
 
 def _voxels() -> VoxelMap:
-    """Returns a map with a point cloud, after writing and reading it in both encodings."""
+    """Returns a map of a point cloud that was written and read in both encodings."""
     point = np.array([[1.5, 0.0, 0.0]])
     seen = empty_map(0.1).with_point_cloud(np.zeros(3), point, point + 0.5, point + 1.0)
     return read_stream(write_binary(read_stream(write_full(seen), seen.resolution, False)), seen.resolution, True)
@@ -145,6 +145,7 @@ def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
 
 
 def _check_motions(scene: PlanningScene) -> None:
+    """Runs every kind of collision check, a search and path shortening in the scene."""
     checker = ExactCollisionChecker(scene)
     checker.is_free(scene.positions)
     checker.path_is_free(np.array([scene.positions, scene.positions + 0.1]), MOTION_STEP)
