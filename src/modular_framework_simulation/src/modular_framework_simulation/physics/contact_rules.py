@@ -2,11 +2,11 @@
 """Makes PyBullet use the smaller friction and restitution coefficient of a contact, as Gazebo's engine does.
 
 By default, PyBullet multiplies the two coefficients. Bullet calls the combining function through a pointer that an
-application may change (PR 1383 of bullet3). PyBullet does not provide a call for this change, and the linker hides the
-pointer, so its address is looked up in the symbol table of the loaded library. The function receives two collision
-objects. A test contact of two spheres with known coefficients reveals the memory location of the coefficients in these
-objects, so the change does not depend on the version or the processor. A library without a symbol table cannot be
-changed. The caller must then set the square root of each coefficient, which is exact for equal surfaces.
+application may change (PR 1383 of bullet3). PyBullet has no call for this change, and the linker hides the pointer. The
+address of the pointer is therefore taken from the symbol table of the loaded library. The combining function receives
+two collision objects. A test contact of two spheres with known coefficients reveals where these objects store the
+coefficients, for any version and processor. Without a symbol table, the pointer cannot be changed. The caller must then
+set the square root of each coefficient, which is exact for equal surfaces.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 _FRICTION_POINTER = "gCalculateCombinedFrictionCallback"
 _RESTITUTION_POINTER = "gCalculateCombinedRestitutionCallback"
 _EXPORTED = "b3ChangeDynamicsInfoSetLateralFriction"
-"""Function that is also visible to the dynamic linker, and therefore reveals the load address of the library."""
+"""Symbol that the dynamic linker also knows, so that its address reveals the load address of the library."""
 
 _ELF_64 = b"\x7fELF\x02"
 _SYMBOL_TABLE = 2
@@ -37,7 +37,7 @@ _SYMBOL = np.dtype(
 )
 
 _SEARCHED_BYTES = 512
-"""Size of the searched memory of a collision object, which is larger."""
+"""Number of searched bytes per collision object; a collision object is larger."""
 _KNOWN_FRICTION, _KNOWN_RESTITUTION = 0.31415926, 0.27182818
 
 _Combine = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
@@ -45,33 +45,33 @@ _Combine = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
 
 @functools.cache
 def use_smaller_coefficients(api: Any) -> bool:
-    """Makes the engine combine friction and restitution by the minimum, for all worlds of this process.
+    """Makes the engine use the minimum of two friction or restitution coefficients, in all worlds of this process.
 
     Args:
-        api: The module pybullet.
+        api: Module pybullet.
 
     Returns:
         Whether the change was possible.
     """
     library = Path(api.__file__)
-    values = _symbol_values(library, (_FRICTION_POINTER, _RESTITUTION_POINTER, _EXPORTED))
-    if values is None:
+    addresses = _relative_addresses(library, (_FRICTION_POINTER, _RESTITUTION_POINTER, _EXPORTED))
+    if addresses is None:
         return False
     exported = ctypes.cast(getattr(ctypes.CDLL(str(library)), _EXPORTED), ctypes.c_void_p).value or 0
     friction, restitution = (
-        ctypes.c_void_p.from_address(exported - values[_EXPORTED] + values[name])
+        ctypes.c_void_p.from_address(exported - addresses[_EXPORTED] + addresses[name])
         for name in (_FRICTION_POINTER, _RESTITUTION_POINTER)
     )
     contents = _object_memory(api, friction)
-    for pointer, known in ((friction, _KNOWN_FRICTION), (restitution, _KNOWN_RESTITUTION)):
-        offset = contents.find(struct.pack("d", known))
+    for pointer, coefficient in ((friction, _KNOWN_FRICTION), (restitution, _KNOWN_RESTITUTION)):
+        offset = contents.find(struct.pack("d", coefficient))
         if offset < 0 or offset % 8:
             return False
         pointer.value = _compiled_minimum(offset // 8)
     return True
 
 
-def _symbol_values(library: Path, names: Sequence[str]) -> dict[str, int] | None:
+def _relative_addresses(library: Path, names: Sequence[str]) -> dict[str, int] | None:
     """Returns the addresses of symbols relative to the load address of an ELF library; None if a symbol is missing."""
     with library.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:5] != _ELF_64:
@@ -82,22 +82,22 @@ def _symbol_values(library: Path, names: Sequence[str]) -> dict[str, int] | None
         tables = sections[sections["type"] == _SYMBOL_TABLE]
         if len(tables) != 1:
             return None
-        table, text = tables[0], sections[tables[0]["link"]]
+        table, names_section = tables[0], sections[tables[0]["link"]]
         begin, end = int(table["offset"]), int(table["offset"] + table["size"])
         symbols = np.frombuffer(data[begin:end], _SYMBOL)
-        begin, end = int(text["offset"]), int(text["offset"] + text["size"])
-        values = {}
+        begin, end = int(names_section["offset"]), int(names_section["offset"] + names_section["size"])
+        addresses = {}
         for name in names:
             offset = data.find(b"\0" + name.encode() + b"\0", begin, end) + 1 - begin
-            found = symbols[symbols["name"] == offset]
-            if len(found) != 1:
+            matches = symbols[symbols["name"] == offset]
+            if len(matches) != 1:
                 return None
-            values[name] = int(found[0]["value"])
-        return values
+            addresses[name] = int(matches[0]["value"])
+        return addresses
 
 
 def _object_memory(api: Any, friction: ctypes.c_void_p) -> bytes:
-    """Returns the first bytes of a collision object with the known coefficients."""
+    """Returns the first bytes of a collision object with the known coefficients, recorded in a test contact."""
     memory: list[bytes] = []
 
     def record(first: int, second: int) -> float:
@@ -126,13 +126,13 @@ _compiled_functions: list[Any] = []
 
 
 def _compiled_minimum(index: int) -> int:
-    """Compiles the minimum of the elements at an index of two arrays, and returns the address of the function."""
-    import numba  # takes half a second, so only simulations import this module
+    """Compiles a function that returns the smaller element at an index of two arrays; returns its address."""
+    import numba  # takes half a second, so only simulations import numba
 
     types: Any = numba.types
-    numbers = types.CPointer(types.float64)
+    array = types.CPointer(types.float64)
 
-    @numba.cfunc(types.float64(numbers, numbers))
+    @numba.cfunc(types.float64(array, array))
     def minimum(first: Any, second: Any) -> Any:
         return min(first[index], second[index])
 
