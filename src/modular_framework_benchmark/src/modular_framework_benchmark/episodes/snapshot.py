@@ -19,17 +19,17 @@ import numpy as np
 import rospkg
 
 RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
-"""Packages whose versions affect results."""
+"""Python packages whose versions affect results."""
 
 ROS_PACKAGES = ("actionlib", "genpy", "robot_state_publisher", "roscpp", "rosgraph", "roslaunch", "rospy", "tf2_ros")
-"""Packages of ROS whose versions affect results."""
+"""ROS packages whose versions affect results."""
 RUN_ID_VARIABLE = "MODULAR_FRAMEWORK_RUN"
-"""Environment variable of every process of a run: RUN/WORKER."""
+"""Environment variable that identifies the run of a process, as RUN/WORKER."""
 
 
 @functools.cache
 def versions() -> dict[str, Any]:
-    """Returns the git revision of this software and the versions of its environment, constant within a process."""
+    """Returns the git revision of this software and the versions of its environment; constant within a process."""
     package_versions = {}
     for name in RECORDED_PACKAGES:
         try:
@@ -49,6 +49,7 @@ def versions() -> dict[str, Any]:
 
 
 def _ros_version(package: str) -> str:
+    """Returns the version of a ROS package, "" for a missing package."""
     try:
         return str(rospkg.RosPack.get_instance().get_manifest(package).version)
     except rospkg.ResourceNotFound:
@@ -56,7 +57,7 @@ def _ros_version(package: str) -> str:
 
 
 def _environment_digest() -> str:
-    """Returns the SHA-256 of names and versions of all Python packages of this environment, hexadecimal."""
+    """Returns the hexadecimal SHA-256 of the names and versions of all Python packages of this environment."""
     package_versions = sorted({f"{package.name}=={package.version}" for package in metadata.distributions()})
     return hashlib.sha256("\n".join(package_versions).encode()).hexdigest()
 
@@ -75,10 +76,10 @@ def _git(*arguments: str) -> str:
 @functools.cache
 def machine() -> dict[str, Any]:
     """Returns the properties of the machine."""
-    names = [line.partition(":")[2].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
+    cpu_names = [line.partition(":")[2].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
     return {
         "host": platform.node(),
-        "cpu": names[0] if names else platform.processor(),
+        "cpu": cpu_names[0] if cpu_names else platform.processor(),
         "cores": len(os.sched_getaffinity(0)),
         "kernel": platform.release(),
         "memory_kb": int(next((line.split()[1] for line in _lines("/proc/meminfo")), "0")),
@@ -87,16 +88,16 @@ def machine() -> dict[str, Any]:
 
 @functools.cache
 def reference_s() -> float:
-    """Returns the minimum duration of a fixed workload in five runs [s], which compares the speed of machines."""
-    times = []
+    """Returns the minimum duration of a fixed workload in five runs [s], for comparisons of the speed of machines."""
+    durations_s = []
     for _ in range(5):
         start = time.perf_counter()
         values = np.random.default_rng(1).standard_normal((200, 200))
         for _ in range(20):
             values = np.tanh(values @ values)
         sum(number * number % 7 for number in range(200_000))
-        times.append(time.perf_counter() - start)
-    return round(min(times), 5)
+        durations_s.append(time.perf_counter() - start)
+    return round(min(durations_s), 5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +105,7 @@ class MachineLoad:
     """Counters of the machine at a moment.
 
     Attributes:
-        time_s: Time of the monotonic clock [s].
+        time_s: Time on the monotonic clock [s].
         load_1_min: Load average over the last minute.
         busy_s: Busy time of the processors [s].
         stolen_s: Processor time that the hypervisor gave to other machines [s].
@@ -120,13 +121,13 @@ class MachineLoad:
     @classmethod
     def now(cls) -> MachineLoad:
         """Reads the counters from /proc."""
-        ticks = [float(value) / _TICKS for value in _lines("/proc/stat")[0].split()[1:]]
+        ticks = [float(value) / _TICKS_PER_S for value in _lines("/proc/stat")[0].split()[1:]]
         stolen_s = ticks[7] if len(ticks) > 7 else 0.0
         busy_s = sum(ticks[:3]) + sum(ticks[5:8])
         return cls(time.monotonic(), os.getloadavg()[0], busy_s, stolen_s, _others_s())
 
     def since(self, before: MachineLoad) -> dict[str, float]:
-        """Returns the load since another moment; `others_share` is the machine fraction used by other processes."""
+        """Returns the load since an earlier moment; `others_share` is the machine fraction used by other processes."""
         others_s = sum(max(spent - before.others_s.get(pid, 0.0), 0.0) for pid, spent in self.others_s.items())
         available_s = max(self.time_s - before.time_s, 1e-3) * len(os.sched_getaffinity(0))
         return {
@@ -138,28 +139,29 @@ class MachineLoad:
         }
 
 
-_TICKS = os.sysconf("SC_CLK_TCK")
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 def _others_s() -> dict[int, float]:
+    """Returns the processor time of each process outside this run [s], keyed by process id."""
     excluded, times_s = {os.getpid(), os.getppid()}, {}
     run = f"{RUN_ID_VARIABLE}={os.environ.get(RUN_ID_VARIABLE, '').partition('/')[0]}".encode()
     for folder in Path("/proc").iterdir():
         try:
             if not folder.name.isdigit() or int(folder.name) in excluded or _is_of_run(folder, run):
                 continue
-            # The name in parentheses may contain spaces.
+            # The process name, in parentheses, may contain spaces.
             fields = (folder / "stat").read_text(errors="replace").rpartition(")")[2].split()
-            times_s[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS
+            times_s[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS_PER_S
         except OSError:  # the process has ended
             continue
     return times_s
 
 
-def _is_of_run(process: Path, run: bytes) -> bool:
+def _is_of_run(process_folder: Path, run: bytes) -> bool:
     try:
-        environment = (process / "environ").read_bytes()
-    except PermissionError:  # a process of another user
+        environment = (process_folder / "environ").read_bytes()
+    except PermissionError:  # the process of a different user
         return False
     return any(variable.startswith(run) for variable in environment.split(b"\0"))
 
