@@ -15,15 +15,17 @@ import psutil
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-STARTS_A_PROGRAM = """
+WAIT = "while True: time.sleep(0.1)"
+"""Python handles a signal that arrives just before a sleep after it, so that one long sleep could delay the end."""
+STARTS_A_PROGRAM = f"""
 import workspace
 import subprocess, sys, time
 child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
 print(child.pid, flush=True)
-time.sleep(600)
+{WAIT}
 """
 
-ENDS_SLOWLY = """
+ENDS_SLOWLY = f"""
 import workspace
 import subprocess, sys, time
 from modular_framework_core.launching import launch_session
@@ -37,7 +39,7 @@ def ask_first(*arguments, **options):
 launch_session.kill_processes_with = ask_first
 child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
 print(child.pid, flush=True)
-time.sleep(600)
+{WAIT}
 """
 
 HAS_A_WORKER = f"""
@@ -46,11 +48,11 @@ import subprocess, sys, time
 worker = subprocess.Popen([sys.executable, "-c", {STARTS_A_PROGRAM!r}], stdout=subprocess.PIPE, text=True)
 print(worker.stdout.readline(), flush=True)
 worker.kill()
-time.sleep(600)
+{WAIT}
 """
 """The worker has no time to end what it started."""
 
-SPAWNS = """
+SPAWNS = f"""
 import workspace
 import multiprocessing, time
 
@@ -64,7 +66,7 @@ if __name__ == "__main__":
     context.Process(target=work, args=(ready,), daemon=True).start()
     ready.wait()
     print("ready", flush=True)
-    time.sleep(600)
+    {WAIT}
 """
 
 
