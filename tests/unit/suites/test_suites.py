@@ -153,7 +153,7 @@ def test_sigterm_ends_the_suites_that_run_and_what_they_started(runner: ModuleTy
         "def test_it():\n"
         "    child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'], start_new_session=True)\n"
         f"    open({str(started)!r}, 'w').write(f'{{child.pid}} ')\n"
-        "    time.sleep(600)\n"
+        "    while True: time.sleep(0.1)\n"  # Python handles a signal just before a long sleep after this sleep
     )
 
     children: list[psutil.Process] = []
