@@ -43,6 +43,7 @@ def test_every_condition_is_stored_and_read_again_and_its_parts_are_documented()
     given: dict[str, dict[str, Any]] = {
         "in_region": {"region": region},
         "cleared": {"region": region, "objects": ("a", "b")},
+        "collected": {"region": region, "objects": ("a", "b"), "count": 1},
         "stacked": {"objects": ("a", "b")},
         "on_top_of": {"support": "a"},
         "inside": {"container": "a"},
@@ -50,7 +51,7 @@ def test_every_condition_is_stored_and_read_again_and_its_parts_are_documented()
     }
     parts = []
     for name, kind in CONDITIONS.items():
-        own = {} if name in ("cleared", "stacked", "joint_at_least") else {"object": "cube"}
+        own = {} if name in ("cleared", "collected", "stacked", "joint_at_least") else {"object": "cube"}
         parts.append(kind(**(own | given.get(name, {})), duration=1.5))  # type: ignore[arg-type]
         assert parts[-1].kind == name and kind.__doc__
     whole = Not(InOrder((All(tuple(parts)), AnyOf((parts[0],)))))

@@ -13,6 +13,7 @@ from modular_framework_benchmark.experiments.success_criteria import SuccessCrit
 from modular_framework_benchmark.predicates.conditions import (
     Aligned,
     Cleared,
+    Collected,
     HeldFor,
     InRegion,
     Inside,
@@ -25,6 +26,7 @@ from modular_framework_benchmark.predicates.conditions import (
     Stacked,
     Upright,
 )
+from modular_framework_benchmark.predicates.contradictions import repetition
 from modular_framework_benchmark.predicates.predicate import All, Condition, InOrder, Not, Predicate
 from modular_framework_benchmark.predicates.predicate import Any as AnyOf
 from modular_framework_benchmark.predicates.progress import Milestone, progress_of
@@ -64,6 +66,16 @@ def last(predicate: Predicate, states: dict[str, Any], *, contacts: Any = (), he
         ),
         (Cleared(region=GOAL, objects=("cube", "lid")), {"lid": state((0.3, 0.2, 0))}, {"lid": state((0.2, 0, 0))}),
         (
+            Collected(region=GOAL, objects=("cube", "lid")),
+            {"cube": state((0.1, 0, 0)), "lid": state((0.2, 0, 0))},
+            {"cube": state((0.1, 0, 0))},
+        ),
+        (
+            Collected(region=GOAL, objects=("cube", "lid"), count=1),
+            {"cube": state((0.1, 0, 0))},
+            {"cube": state((0.1, 0.2, 0))},
+        ),
+        (
             Inside(object="cube", container="bin", tolerance=0.0),
             {"bin": state((1, 1, 0), (0, 0, 0.7)), "cube": state((1, 1, 0.031))},
             {"bin": state((1, 1, 0)), "cube": state((1.081, 1, 0.031))},
@@ -95,6 +107,25 @@ def test_a_condition_on_poses_holds_within_its_tolerance(
 ) -> None:
     assert last(condition, holds)
     assert not last(condition, fails)
+
+
+def test_an_object_above_the_region_counts_as_collected_once_it_is_released() -> None:
+    collected, above = Collected(region=GOAL, objects=("cube", "lid"), count=1), {"cube": state((0.2, 0, 0))}
+    assert last(collected, above, held=["lid"]) and not last(collected, above, held=["cube"])
+
+
+def test_objects_that_were_not_collected_are_named() -> None:
+    stage = stage_of(sample(0.0, START | {"cube": state((0.2, 0, 0))}, [], []))
+    (reason,) = Collected(region=GOAL, objects=("cube", "lid", "table")).unmet_reasons(stage)
+    assert reason == "1 of 3 objects are in the region 'goal' (wanted: at least 3; elsewhere: lid, table)"
+
+
+def test_fewer_collected_objects_are_no_further_milestone() -> None:
+    two, one = (
+        Milestone(name=str(count), predicate=Collected(region=GOAL, objects=("cube", "lid"), count=count))
+        for count in (2, 1)
+    )
+    assert repetition((two, one)) == (1, "2") and repetition((one, two)) == (-1, "")
 
 
 def test_an_object_lies_on_what_it_touches_below_its_centre() -> None:

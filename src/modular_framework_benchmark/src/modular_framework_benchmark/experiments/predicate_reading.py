@@ -15,6 +15,7 @@ from modular_framework_benchmark.predicates.conditions import (
     CONDITIONS,
     OLD_ON_TOP_OF,
     ON_TOP_OF,
+    Collected,
     Region,
     Span,
     Stacked,
@@ -183,6 +184,11 @@ class PredicateReading:
         if isinstance(condition, Stacked) and len(condition.objects) < 2:
             self.reading.faults.add(value.location, "stacked needs at least two objects, the lowest first; add one")
             return None
+        if isinstance(condition, Collected) and condition.wanted > len(condition.objects):
+            limit = f"1 to {len(condition.objects)}, the number of objects"
+            text = f"count of collected is {condition.wanted}; allowed: {limit}"
+            self.reading.faults.add(node.entries["count"].location, text)
+            return None
         return condition
 
     def _values(
@@ -208,6 +214,8 @@ class PredicateReading:
         match key.kind:
             case KeyKind.NUMBER:
                 return self.reading.number(node, what, key.low, key.high)
+            case KeyKind.COUNT:
+                return self.reading.count(node, what, int(key.low), int(key.high))
             case KeyKind.VECTOR:
                 return self._vector(node, what, key)
             case KeyKind.NAME:

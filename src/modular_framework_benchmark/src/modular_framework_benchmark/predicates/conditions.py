@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from modular_framework_benchmark.predicates.predicate import Condition
-from modular_framework_benchmark.predicates.predicate_keys import KeyKind, name, number, vector
+from modular_framework_benchmark.predicates.predicate_keys import KeyKind, name, number, vector, whole_number
 from modular_framework_benchmark.predicates.world_track import ROBOT, WORLD, BodyTrack, Flags, Floats, WorldTrack
 from modular_framework_benchmark.records.episode_settings import Tagged
 
@@ -423,6 +423,53 @@ class Cleared(Condition):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Collected(Condition):
+    """The centres of the boxes of enough objects are in a region of the world frame; held objects do not count.
+
+    Attributes:
+        region: The region.
+        objects: Names of the objects.
+        count: Smallest number of objects in the region; None for all.
+    """
+
+    region: Region = name(KeyKind.REGION)
+    objects: tuple[str, ...] = name(KeyKind.OBJECTS)
+    count: int | None = whole_number(1)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Returns the names of the objects."""
+        return self.objects
+
+    @property
+    def wanted(self) -> int:
+        """Returns the smallest number of objects in the region."""
+        return len(self.objects) if self.count is None else self.count
+
+    @property
+    def statement(self) -> str:
+        """Returns a description of the condition."""
+        return f"at least {self.wanted} of {', '.join(self.objects)} are in the region '{self.region.name}'"
+
+    def satisfied_in(self, world: WorldTrack) -> Flags:
+        """Returns whether enough objects are in the region, shape (n,)."""
+        return np.asarray(self.collected_objects(world).sum(axis=0) >= self.wanted)
+
+    def measurement_text(self, world: WorldTrack) -> str:
+        """Returns the number of objects in the region, and the objects that are elsewhere."""
+        inside = self.collected_objects(world)[:, -1]
+        elsewhere = [each for each, is_inside in zip(self.objects, inside, strict=True) if not is_inside]
+        found = f"{inside.sum()} of {len(self.objects)} objects are in the region '{self.region.name}'"
+        return f"{found} (wanted: at least {self.wanted}; elsewhere: {', '.join(elsewhere) or 'none'})"
+
+    def collected_objects(self, world: WorldTrack) -> Flags:
+        """Returns whether each object is in the region and released at each moment, shape (objects, n)."""
+        return np.array(
+            [self.region.contains(world.bodies[each].centres) & ~world.holds(each) for each in self.objects]
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NotMoved(PoseCondition):
     """The frame of the object is at its pose at the start of the task."""
 
@@ -519,6 +566,7 @@ CONDITIONS: dict[str, type[Condition]] = {
     "aligned": Aligned,
     "joint_at_least": JointAtLeast,
     "cleared": Cleared,
+    "collected": Collected,
     "not_moved": NotMoved,
     "no_contact": NoContact,
     "stacked": Stacked,

@@ -9,6 +9,7 @@ from itertools import combinations
 
 from modular_framework_benchmark.predicates.conditions import (
     Cleared,
+    Collected,
     HeldFor,
     InRegion,
     Inside,
@@ -79,6 +80,8 @@ def _excludes(first: Predicate, second: Predicate) -> bool:
             return first.object == second.object and first.region.is_apart_from(second.region)
         case InRegion(), Cleared():
             return first.object in second.objects and first.region == second.region
+        case Collected(), Cleared():
+            return set(first.objects) <= set(second.objects) and first.region == second.region
         case Lifted(), NotMoved():
             return first.object == second.object and first.height >= second.distance
         case HeldFor(), NoContact():
@@ -99,6 +102,8 @@ def _implies(first: Predicate, second: Predicate) -> bool:
     match first, second:
         case (Lifted(), Lifted()) if first.height >= second.height and first.duration >= second.duration:
             return replace(first, height=second.height, duration=second.duration) == second
+        case (Collected(), Collected()) if first.wanted >= second.wanted and first.duration >= second.duration:
+            return replace(first, count=second.count, duration=second.duration) == second
         case (JointAtLeast(), JointAtLeast()) if (
             first.position >= second.position and first.duration >= second.duration
         ):

@@ -18,6 +18,7 @@ class KeyKind(Enum):
     MODEL = "model"  # name of a model
     REGION = "region"  # name of a region
     NUMBER = "number"
+    COUNT = "count"  # whole number
     VECTOR = "vector"  # three numbers
     NAME = "name"  # a string that is checked in the episode, such as a joint name
 
@@ -50,6 +51,15 @@ def number(default: float | None, *, low: float = 0.0, high: float = 1000.0, req
     """
     key = {_KEY: PredicateKey(KeyKind.NUMBER, low, high)}
     return field(metadata=key) if required else field(default=default, metadata=key)
+
+
+def whole_number(low: int) -> Any:
+    """Declares a whole number; None without the key.
+
+    Args:
+        low: Smallest number.
+    """
+    return field(default=None, metadata={_KEY: PredicateKey(KeyKind.COUNT, low)})
 
 
 def vector(*, low: float, high: float) -> Any:
