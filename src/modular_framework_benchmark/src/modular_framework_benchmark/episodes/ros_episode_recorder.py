@@ -43,6 +43,7 @@ from modular_framework_benchmark.episodes.ros_world import (
     end_world_record,
     judge,
     spawn,
+    wait_for_rest,
 )
 from modular_framework_benchmark.records.episode_settings import PlacedObject, from_json
 from modular_framework_core.task_runner.ros_episode import (
@@ -63,7 +64,8 @@ GENERATION_SIGNAL = "/grasp_generated"
 GENERATION_SERVICE_S = 30.0
 """Wait for a method's service after its signal [s]; on a busy machine the connection takes seconds."""
 POLL_S = 0.02
-SETTLE_S = 0.5
+SETTLE_S, MAX_SETTLE_S = 0.5, 10.0
+"""Shortest and longest time in which spawned objects come to rest [s, simulated time]."""
 SAMPLE_S, SAMPLES_TIMEOUT_S = 0.02, 2.0
 SERVICE_TIMEOUT_S, STOP_TIMEOUT_S = 60.0, 3.0
 START_SERVICE, STOP_SERVICE = "/task/start", "/task/stop"
@@ -192,6 +194,7 @@ class EpisodeRecorder:
         else:
             spawn_all()
             self._time.sleep(SETTLE_S)
+        wait_for_rest([placed.name for placed in request.objects], MAX_SETTLE_S - SETTLE_S, self._time.sleep)
         answer["requested_s"], answer["requested_wall"] = self._now() - answer["zero"], time.monotonic()
         if self._time.enabled and generate_grasps():
             answer["generation_s"] = time.monotonic() - answer["requested_wall"]

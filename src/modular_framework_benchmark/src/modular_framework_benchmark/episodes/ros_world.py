@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import rosgraph
 import rospy
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import SetModelState, SpawnModel
+from gazebo_msgs.srv import GetModelState, GetModelStateRequest, SetModelState, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
@@ -22,6 +23,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.model_variants import changed_model, read_scaled
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
+MODEL_STATE_SERVICE = "/gazebo/get_model_state"
 SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE, PERCEPTION_SERVICE = (
     "/gazebo/spawn_sdf_model",
     "/gazebo/referee",
@@ -32,6 +34,11 @@ SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
 ABORTED_TIMEOUT_S = 5.0
 """Wait for the record of an episode that was aborted, whose simulation may hang [s]."""
 SERVICE_TIMEOUT_S = 60.0  # long enough for a convex decomposition of a mesh
+
+REST_M_S, REST_RAD_S = 0.02, 0.2
+"""Highest speeds of an object at rest."""
+REST_PERIOD_S = 0.1
+"""Period in which the speeds are checked [s, simulated time]."""
 
 
 class WorldError(RuntimeError):
@@ -56,6 +63,42 @@ def spawn(placed: PlacedObject) -> None:
     response = request_service(SPAWN_SERVICE, SpawnModel, request, SERVICE_TIMEOUT_S)
     if not response.success:
         raise WorldError(f"object '{placed.name}' cannot be spawned: {response.status_message}")
+
+
+def moving_objects(names: Iterable[str]) -> list[str]:
+    """Returns the objects that move faster than an object at rest.
+
+    Args:
+        names: Names of the objects.
+
+    Raises:
+        CallError: The simulation does not answer.
+    """
+    return [name for name in names if _moves(name)]
+
+
+def wait_for_rest(names: Collection[str], longest_s: float, sleep: Callable[[float], None]) -> None:
+    """Waits until objects are at rest, or for the longest time.
+
+    Args:
+        names: Names of the objects.
+        longest_s: Longest time [s, simulated time].
+        sleep: Function that waits for a simulated time [s].
+
+    Raises:
+        CallError: The simulation does not answer.
+    """
+    for _ in range(round(longest_s / REST_PERIOD_S)):
+        if not moving_objects(names):
+            return
+        sleep(REST_PERIOD_S)
+
+
+def _moves(name: str) -> bool:
+    request = GetModelStateRequest(model_name=name)
+    twist = request_service(MODEL_STATE_SERVICE, GetModelState, request, SERVICE_TIMEOUT_S).twist
+    linear, angular = (math.hypot(each.x, each.y, each.z) for each in (twist.linear, twist.angular))
+    return linear > REST_M_S or angular > REST_RAD_S
 
 
 @dataclass(frozen=True, slots=True)
