@@ -80,6 +80,8 @@ def test_the_object_is_oriented_as_at_the_grasp_and_the_hand_goes_back_as_it_cam
         math.hypot(0.1, 0.03)
     )
     assert first.pre_place_approach.direction.vector.z == -1.0
+    many = place_locations(found, [place] * 1000, {"finger": 0.04})
+    assert [location.id for location in many] == [f"place {index}" for index in range(72)], "they share 10 s"
 
 
 @pytest.mark.parametrize(

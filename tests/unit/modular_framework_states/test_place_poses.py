@@ -96,6 +96,12 @@ def test_a_lying_object_stays_lying_unless_more_tilt_is_allowed() -> None:
         place_poses(CUBE, Rotation.from_euler("x", 0.5), face(), GOAL, PlaceLimits(max_tilt_rad=0.1))
 
 
+def test_an_object_is_released_above_the_place_where_it_would_stand() -> None:
+    floor = TargetRegion(name="bin", x=(0.1, 0.2), y=(0.4, 0.6), z=(0.84, 0.9))
+    dropped = place_poses(CUBE, IDENTITY, face(), floor, PlaceLimits(gap_m=0.16))[0]
+    assert np.allclose(dropped.position, [0.15, 0.5, 0.84 + 0.16 + 0.025])
+
+
 def test_beside_an_edge_the_object_stays_on_the_surface() -> None:
     edge = TargetRegion(name="edge", x=(0.4, 0.78), y=(0.4, 0.6))
     poses = place_poses(CUBE, IDENTITY, face(TargetRegion(name="table", x=(0.4, 0.6), y=(0.4, 0.6))), edge)

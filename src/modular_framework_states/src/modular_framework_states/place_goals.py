@@ -28,6 +28,9 @@ SERVICE_TIMEOUT_S = 10.0
 APPROACH_M, MIN_APPROACH_M = 0.1, 0.03
 MIN_RETREAT = 0.5
 """Minimum fraction of the path back to the pregrasp pose."""
+MAX_LOCATIONS = 72
+"""Maximum number of locations, as many as a stable pose has. Locations share the planning time, which would be too
+short for each of the many poses in which a cylinder lies."""
 COMPONENTS = PlanningSceneComponents(
     PlanningSceneComponents.WORLD_OBJECT_NAMES
     | PlanningSceneComponents.WORLD_OBJECT_GEOMETRY
@@ -134,7 +137,7 @@ def _solids(message: CollisionObject, in_own_frame: bool = False) -> Sequence[Tr
 
 
 def place_locations(scene: PlaceScene, poses: Sequence[PlacePose], fingers: Mapping[str, float]) -> list[PlaceLocation]:
-    """Returns the locations of a place goal, the best first.
+    """Returns the locations of a place goal, the best first, at most `MAX_LOCATIONS`.
 
     Args:
         scene: Scene of the place.
@@ -152,7 +155,7 @@ def place_locations(scene: PlaceScene, poses: Sequence[PlacePose], fingers: Mapp
             post_place_retreat=_translation(scene.tip_link, scene.retreat, length, MIN_RETREAT * length),
             post_place_posture=opened,
         )
-        for index, pose in enumerate(poses)
+        for index, pose in enumerate(poses[:MAX_LOCATIONS])
     ]
 
 

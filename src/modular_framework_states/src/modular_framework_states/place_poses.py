@@ -49,6 +49,11 @@ class TargetRegion:
     y: tuple[float, float] = UNLIMITED
     z: tuple[float, float] = UNLIMITED
 
+    def contains(self, point: Array) -> bool:
+        """Returns whether a point of shape (3,) is in the region."""
+        spans = (self.x, self.y, self.z)
+        return all(low <= value <= high for value, (low, high) in zip(point, spans, strict=True))
+
     @property
     def label(self) -> str:
         """Returns the region in words, for errors."""
@@ -108,7 +113,7 @@ class PlaceLimits:
     Attributes:
         max_tilt_rad: Largest angle between the vertical and the direction that was vertical at the grasp [rad].
         overhang_m: Distance by which the lower face of the object may leave the supporting face [m].
-        gap_m: Distance between the object and the face [m].
+        gap_m: Height above the face at which the object is released [m].
         aligned: Whether the longest edges of the two faces must be parallel or perpendicular.
     """
 
@@ -227,10 +232,11 @@ def place_poses(
     for upright in _upright(stable_directions(solids), held, limits.max_tilt_rad):
         yaws = _aligned_yaws(_stance(upright, corners - centre).feet, face.corners) if limits.aligned else YAWS_RAD
         stances = [_stance(Rotation.from_euler("z", yaw) * upright, corners - centre) for yaw in yaws]
-        height = face.height + limits.gap_m + stances[0].height
+        height = face.height + stances[0].height
         if not region.z[0] <= height <= region.z[1]:
             excess.append(math.inf)
             continue
+        height += limits.gap_m
         for point, stance in itertools.product(points, stances):
             excess.append(face.excess(stance.feet + point))
             if excess[-1] <= limits.overhang_m + 1.0e-9:

@@ -29,7 +29,7 @@ PLACE_ACTION, REGIONS_PARAMETER = "place", "/regions"
 SERVER_TIMEOUT_S, CANCEL_S = 10.0, 30.0
 FAULTS = (CallError, ManagerError, PlaceError, RobotModelError, SceneObjectError, ShapeError, StageError)
 GAP_M = 0.002
-"""Height above the support at which the object is released, so that a moving object does not touch the support [m]."""
+"""Release height at which a moving object does not touch the support [m]."""
 
 
 class PlanPlace(FrameworkState):
@@ -48,6 +48,8 @@ class PlanPlace(FrameworkState):
         align: Whether the longest edge of the lower face is parallel or perpendicular to the longest edge of the
             support's upper face, as for blocks of a tower.
         max_tilt: Largest angle by which the object may be tilted with respect to its orientation at the grasp [rad].
+        release_height: Height of the object above the support at the release [m]; more than the height of a bin's walls
+            drops the object into the bin.
         posture: Posture of the fingers after the release, a state of the manipulator's planning group.
         approach_plan: Name of the stored plan down to the place.
         retreat_plan: Name of the stored plan back from the place.
@@ -65,6 +67,7 @@ class PlanPlace(FrameworkState):
         overhang: NotNegative = 0.0,
         align: bool = False,
         max_tilt: Annotated[float, Limits(at_least=0.0, at_most=3.15)] = 0.3,
+        release_height: NotNegative = GAP_M,
         posture: Annotated[str, Named("posture")] = "open",
         approach_plan: Annotated[str, Named("plan", made=True)] = "place_approach",
         retreat_plan: Annotated[str, Named("plan", made=True)] = "place_retreat",
@@ -74,7 +77,7 @@ class PlanPlace(FrameworkState):
         super().__init__(**keys)
         self._support, self._region, self._posture = support, region, posture
         self._limits = PlaceLimits(
-            max_tilt_rad=float(max_tilt), overhang_m=float(overhang), gap_m=GAP_M, aligned=bool(align)
+            max_tilt_rad=float(max_tilt), overhang_m=float(overhang), gap_m=float(release_height), aligned=bool(align)
         )
         self._plan_names, self._timeout_s = {"approach": approach_plan, "retreat": retreat_plan}, float(timeout)
 
