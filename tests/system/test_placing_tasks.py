@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shipped tasks that put objects down: a pick and place with a narrow region, and a tower of two blocks."""
+"""The shipped tasks that put objects down: a pick and place with a narrow region, a tower of two blocks, and a bin."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,11 +21,19 @@ from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStat
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A combination of levels of a shipped experiment, with its milestones."""
+    """A combination of levels of a shipped experiment, with its milestones.
+
+    Attributes:
+        file: File of the experiment.
+        configuration: Level of each factor.
+        milestones: Names of the milestones.
+        kept_objects: Number of objects to collect, instead of all objects of the experiment; None for all.
+    """
 
     file: str
     configuration: Mapping[str, str]
     milestones: tuple[str, ...]
+    kept_objects: int | None = None
 
 
 PICK_AND_PLACE = Case(
@@ -37,6 +46,12 @@ STACK = Case(
     {"grasp_method": "top_down", "blocks": "two", "size": "0.06"},
     ("block_2_lifted", "block_2_placed", "block_2_released"),
 )
+CLEAR_TABLE = Case(
+    "clear_cluttered_table.yaml",
+    {"grasp_method": "antipodal", "scene": "standing"},
+    ("objects_1", "objects_2"),
+    kept_objects=2,
+)
 UR5, PANDA = "modular_framework_api", "panda_hand_robot"
 
 
@@ -45,11 +60,24 @@ def episode(case: Case, robot: str) -> EpisodeSpec:
     file, launch = experiment_path(Path(case.file)), f"{robot}/start_framework.launch"
     experiment = load_experiment(file, RosResourceLookup(), known_metrics(), launch=launch)
     found = next(spec for spec in plan_episodes(experiment) if spec.configuration == case.configuration)
-    return replace(found, settings=replace(found.settings, time_limit=400.0))
+    settings = replace(found.settings, time_limit=400.0)
+    if case.kept_objects is not None:
+        settings = with_fewer_objects(settings, case.kept_objects)
+    return replace(found, settings=settings)
+
+
+def with_fewer_objects(settings: Any, count: int) -> Any:
+    """The settings of an experiment that collects its first objects only, with a milestone for each object."""
+    objects = settings.objects[:count]
+    names = tuple(placed.name for placed in objects)
+    required = replace(settings.success.required, objects=names)
+    milestones = (replace(each, predicate=replace(each.predicate, objects=names)) for each in settings.progress[:count])
+    success = replace(settings.success, required=required)
+    return replace(settings, objects=objects, success=success, progress=tuple(milestones))
 
 
 @pytest.mark.parametrize("robot", [UR5, PANDA])
-@pytest.mark.parametrize("case", [PICK_AND_PLACE, STACK], ids=["pick_and_place", "stack"])
+@pytest.mark.parametrize("case", [PICK_AND_PLACE, STACK, CLEAR_TABLE], ids=["pick_and_place", "stack", "clear_table"])
 def test_the_task_reaches_its_milestones_and_succeeds(tmp_path: Path, case: Case, robot: str) -> None:
     runner = TaskEpisodeRunner()
     try:

@@ -33,6 +33,7 @@ EXPECTED = {
     "move",
     "grasp",
     "generate_grasps",
+    "next_in_region",
     "next_in_tower",
     "allow_manipulator_collisions",
     "execute_trajectory",

@@ -204,8 +204,8 @@ def test_a_task_that_is_not_there_is_named_with_those_that_are(capsys: pytest.Ca
     assert main(["--check", "simulation_pik.yaml"]) == 1
     message = capsys.readouterr().err
     assert (
-        "there is no such file; allowed: pick_and_hold.yaml, pick_and_place.yaml, simulation_pick.yaml, stack.yaml; "
-        "did you mean" in message
+        "there is no such file; allowed: clear_table.yaml, pick_and_hold.yaml, pick_and_place.yaml, "
+        "simulation_pick.yaml, stack.yaml; did you mean" in message
     )
 
 
