@@ -208,6 +208,8 @@ def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
         ("{all: [{in_region: {region: goal}}, {in_region: {region: away}}], shake: 1}", "{all",
          "success contradicts itself: 'cube_1' is in the region 'goal', but 'cube_1' is in the region 'away'"),
         ("{held_for: {}, no_contact: {}}", "{held_for", "success contradicts itself: 'cube_1' is in the gripper, but"),
+        ("{held_for: {}, untouched: {}}", "{held_for", "success contradicts itself: 'cube_1' is in the gripper, but"),
+        ("{untouched: {other: tabel}}", "tabel", "other of untouched 'tabel' is unknown; allowed: cube_1, ball_1,"),
         ("{lifted: {height: 0.2}, not_moved: {}}", "{lifted", "success contradicts itself: 'cube_1' is more than"),
         ("{upright: {}, not: {upright: {}}}", "{upright", "success contradicts itself: 'cube_1' stands upright, but"),
         ("{on_top_of: {support: cube_1}}", "{on_top_of", "success contradicts itself: 'cube_1' lies on 'cube_1' names"),

@@ -12,6 +12,7 @@ from predicate_worlds import STANDING_M, sample, stage_of, state
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.failure_classes import FailureClass, failure_class
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
+from modular_framework_benchmark.predicates.conditions import NoContact, Untouched
 from modular_framework_benchmark.predicates.world_track import WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, REACHABLE, Figure
@@ -131,3 +132,12 @@ def test_what_the_world_shows_decides_about_a_task_that_claims_success() -> None
     assert failure_class(replace(FAILED, reports=grasp, world=world(10.0)), True) is FailureClass.MISPLACED
     assert failure_class(replace(FAILED, world=world(None)), True) is FailureClass.MISPLACED  # it was pushed
     assert failure_class(replace(FAILED, reports=grasp, world=world(10.0)), False) is FailureClass.MISPLACED
+
+
+def test_a_robot_that_touched_what_had_to_stay_untouched_collided() -> None:
+    samples = [sample(0.0, {"cube": state((0, 0, STANDING_M)), "lid": state((1, 0, 0))}, [], [])]
+    samples += [sample(3.0, {}, [["arm", "cube"]], ["cube"]), sample(4.0, {}, [["arm", "cube"], ["arm", "lid"]])]
+    placed = replace(FAILED, reports=(report("grasp", 3.0),), world=stage_of(*samples, sample(5.0, {}, [])).world)
+    assert failure_class(placed, True, (Untouched(object="lid"),)) is FailureClass.COLLISION
+    assert failure_class(placed, True, (NoContact(object="lid"),)) is FailureClass.MISPLACED
+    assert failure_class(placed, True, (Untouched(object="lid", other="table"),)) is FailureClass.MISPLACED

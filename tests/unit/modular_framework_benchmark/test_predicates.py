@@ -24,6 +24,7 @@ from modular_framework_benchmark.predicates.conditions import (
     OnTopOf,
     Region,
     Stacked,
+    Untouched,
     Upright,
 )
 from modular_framework_benchmark.predicates.contradictions import repetition
@@ -154,6 +155,16 @@ def test_contact_and_grasp_come_from_the_simulation() -> None:
     assert not last(NoContact(object="cube", other="table"), {}, contacts=[("cube", "table")])
 
 
+def test_an_object_stays_untouched_until_its_first_contact() -> None:
+    contacts = [[], [["arm", "table"]], [["arm", "lid"]], []]
+    stage = stage_of(*(sample(0.5 * index, {} if index else START, each, []) for index, each in enumerate(contacts)))
+    lid, table = Untouched(object="lid"), Untouched(object="table")
+    assert lid.truth_over(stage).tolist() == [True, True, False, False]
+    assert lid.unmet_reasons(stage) == ("'lid' touched 'robot' 1.00 s after the start (wanted: no contact)",)
+    assert table.truth_over(stage).tolist() == [True, False, False, False]
+    assert Untouched(object="lid", other="table").truth_over(stage).all()
+
+
 def test_a_condition_must_hold_for_its_duration_without_interruption() -> None:
     times_s = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     held = [["cube"], ["cube"], [], ["cube"], ["cube"], ["cube"]]
@@ -185,6 +196,7 @@ def test_combinations_hold_as_their_names_say() -> None:
 def test_a_model_that_is_not_in_the_world_satisfies_nothing() -> None:
     stage = stage_of(sample(0.0, START, [], []), sample(1.0, {"cube": None}))
     assert not NotMoved(object="cube").truth_over(stage)[-1] and not NoContact(object="cube").truth_over(stage)[-1]
+    assert not Untouched(object="cube").truth_over(stage)[-1]
     assert Upright(object="cup").unmet_reasons(stage) == ("there is no 'cup' in the world",)
 
 

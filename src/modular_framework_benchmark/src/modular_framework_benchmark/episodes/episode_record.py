@@ -25,10 +25,11 @@ from modular_framework_benchmark.metrics.recording_files import (
     reports_of,
 )
 from modular_framework_benchmark.metrics.registry import measure
+from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.progress import Progress, progress_of
 from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.episode_settings import as_json
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
@@ -135,7 +136,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         folder=end.folder,
     )
     measured = measure(end.spec.settings.metrics, measurements)
-    failure = failure_class(measurements, bool(answer.get("task_succeeded")))
+    failure = failure_class(measurements, bool(answer.get("task_succeeded")), _success_conditions(end.spec.settings))
     invalid = end.status is EpisodeStatus.INVALID
     spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording), *_milestone_spans(progress))
     return EpisodeRecord(
@@ -163,6 +164,12 @@ def _progress(end: EpisodeEnd, stage: SimulatedStage | None) -> Progress | None:
     if not isinstance(settings, TaskSettings) or not settings.progress:
         return None
     return progress_of(settings.progress, stage)
+
+
+def _success_conditions(settings: EpisodeSettings) -> tuple[Condition, ...]:
+    """Returns the conditions of the success criteria of a task; empty in other modes."""
+    required = settings.success.required if isinstance(settings, TaskSettings) else None
+    return required.conditions if required is not None else ()
 
 
 def _milestone_spans(progress: Progress | None) -> list[Span]:

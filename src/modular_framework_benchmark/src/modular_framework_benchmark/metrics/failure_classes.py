@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
 
 import numpy as np
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
-from modular_framework_benchmark.predicates.world_track import Floats, WorldTrack
+from modular_framework_benchmark.predicates.conditions import Untouched
+from modular_framework_benchmark.predicates.predicate import Condition
+from modular_framework_benchmark.predicates.world_track import ROBOT, Floats, WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, REACHABLE
 
@@ -29,7 +32,7 @@ class FailureClass(Enum):
     NO_CANDIDATE = "no candidate"  # the method found no grasp
     UNREACHABLE = "unreachable"  # no grasp or goal that the arm can reach
     NO_PLAN = "no plan"  # the last failure of the task was a plan
-    COLLISION = "collision in execution"  # a motion was not completed, and the robot touched something else
+    COLLISION = "collision in execution"  # the robot touched something else, and a motion or an `untouched` failed
     MOTION = "motion not completed"  # a motion was not completed, without a contact in the record
     GRASP_MISSED = "grasp missed"  # the gripper closed, and never held the object
     SLIPPED = "slipped"  # the gripper lost the object near its start
@@ -47,7 +50,9 @@ _OF_STATUS = {
 }
 
 
-def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> FailureClass | None:
+def failure_class(
+    episode: EpisodeMeasurements, task_succeeded: bool, conditions: Iterable[Condition] = ()
+) -> FailureClass | None:
     """Returns the class of an episode; None for a success.
 
     The class names the end of the attempt: the loss of a held object unless the gripper opened on purpose, otherwise
@@ -56,6 +61,7 @@ def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> Failure
     Args:
         episode: Measurements of the episode.
         task_succeeded: Whether the task itself ended with success.
+        conditions: Conditions of the success criteria.
     """
     if episode.status is EpisodeStatus.SUCCEEDED:
         return None
@@ -70,8 +76,18 @@ def failure_class(episode: EpisodeMeasurements, task_succeeded: bool) -> Failure
         return _of_component(max(failed, key=lambda report: report.ended_s), episode)
     if not task_succeeded and not any(report.component in AFTER_GENERATION for report in episode.reports):
         return FailureClass.NO_CANDIDATE
+    if episode.world is not None and _touched_untouched(conditions, episode.world):
+        return FailureClass.COLLISION
     missed = grasps and episode.target and not _held_objects(episode.world)
     return FailureClass.GRASP_MISSED if missed else FailureClass.MISPLACED
+
+
+def _touched_untouched(conditions: Iterable[Condition], world: WorldTrack) -> bool:
+    """Returns whether a robot touched a model that had to stay untouched."""
+    return any(
+        isinstance(item, Untouched) and item.other == ROBOT and not item.satisfied_in(world)[-1:].all()
+        for item in conditions
+    )
 
 
 def _held_objects(world: WorldTrack | None) -> set[str]:

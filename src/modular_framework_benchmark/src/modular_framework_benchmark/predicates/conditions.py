@@ -519,6 +519,29 @@ class NoContact(ObjectCondition):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Untouched(NoContact):
+    """The object has not pressed on another model since the start of the task."""
+
+    @property
+    def statement(self) -> str:
+        """Returns a description of the condition."""
+        return f"'{self.object}' has not touched '{self.other}' since the start"
+
+    def satisfied_in(self, world: WorldTrack) -> Flags:
+        """Returns whether the models have not touched up to each moment, shape (n,)."""
+        exists = ~np.isnan(world.bodies[self.object].positions[:, 0])
+        return np.asarray(exists & ~np.logical_or.accumulate(world.touches(self.object, self.other)))
+
+    def measurement_text(self, world: WorldTrack) -> str:
+        """Returns the moment of the first contact."""
+        touching = world.touches(self.object, self.other)
+        if not touching.any():
+            return f"'{self.object}' has not touched '{self.other}' (wanted: no contact)"
+        after_s = float(world.times_s[np.argmax(touching)] - world.times_s[0])
+        return f"'{self.object}' touched '{self.other}' {after_s:.2f} s after the start (wanted: no contact)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Stacked(Condition):
     """Each object lies on the previous object, as in `On`.
 
@@ -569,6 +592,7 @@ CONDITIONS: dict[str, type[Condition]] = {
     "collected": Collected,
     "not_moved": NotMoved,
     "no_contact": NoContact,
+    "untouched": Untouched,
     "stacked": Stacked,
 }
 """All conditions, keyed by their name in experiment files."""
