@@ -45,7 +45,15 @@ PUBLISHED = {
     "mustard_bottle": (603.0, (58.0, 95.0, 190.0), 0.40),
 }
 OFFSETS_MM = {"remote_control": 11.0, "board_marker": 2.0, "voltage_tester": 11.5, "pencil": 5.5}
-WORLDS = {"empty_table": 0, "cluttered_table": 10, "shelf": 5, "bin": 6, "table_and_bin": 0}
+WORLDS = {
+    "empty_table": 0,
+    "cluttered_table": 10,
+    "shelf": 5,
+    "bin": 6,
+    "table_and_bin": 0,
+    "low_compartment": 0,
+    "high_compartment": 0,
+}
 STEPS = 500
 
 
