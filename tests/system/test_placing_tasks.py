@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shipped tasks that put objects down: a pick and place with a narrow region, a tower of two blocks, and a bin."""
+"""Shipped experiments that put objects down: in a region, in a tower of two blocks, into a bin, and out of a shelf."""
 
 from __future__ import annotations
 
@@ -52,6 +52,11 @@ CLEAR_TABLE = Case(
     ("objects_1", "objects_2"),
     kept_objects=2,
 )
+SHELF = Case(
+    "shelf_compartment.yaml",
+    {"grasp_method": "antipodal", "planner": "RRTConnect", "height": "250_mm", "position": "front"},
+    ("grasped", "out_of_the_shelf", "put_down", "released"),
+)
 UR5, PANDA = "modular_framework_api", "panda_hand_robot"
 
 
@@ -77,7 +82,9 @@ def with_fewer_objects(settings: Any, count: int) -> Any:
 
 
 @pytest.mark.parametrize("robot", [UR5, PANDA])
-@pytest.mark.parametrize("case", [PICK_AND_PLACE, STACK, CLEAR_TABLE], ids=["pick_and_place", "stack", "clear_table"])
+@pytest.mark.parametrize(
+    "case", [PICK_AND_PLACE, STACK, CLEAR_TABLE, SHELF], ids=["pick_and_place", "stack", "clear_table", "shelf"]
+)
 def test_the_task_reaches_its_milestones_and_succeeds(tmp_path: Path, case: Case, robot: str) -> None:
     runner = TaskEpisodeRunner()
     try:
