@@ -334,8 +334,8 @@ def _claims() -> Iterator[Condition]:
                world=simulate.times((0.7,) * 3, (5.0,) * 3), pairs=60, step=15)  # fmt: skip
     yield same("progress over 4 milestones, a look after every 10 of 100", looking,
                world=simulate.milestones((0.7, 0.7)), pairs=100, step=10)  # fmt: skip
-    yield same("reported as alike within 20 points, true difference 28", alike, world=simulate.shapes("normal", shift=0.5),
-               smallest=0.2, pairs=128)  # fmt: skip
+    yield same("reported as alike within 20 points, true difference 28", alike,
+               world=simulate.shapes("normal", shift=0.5), smallest=0.2, pairs=128)  # fmt: skip
     yield same("fixed, extended from 50 to 100 pairs", extending, True,
                world=simulate.times((0.7,) * 2, (5.0,) * 2), pairs=50, more=100)  # fmt: skip
     yield same("fixed, extended from 200 to 400 pairs", extending, world=simulate.successes(0.75), pairs=200, more=400)
