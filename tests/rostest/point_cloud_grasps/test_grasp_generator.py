@@ -109,7 +109,6 @@ class TestPointCloudGrasps(GraspGeneratorConformance):
         rospy.set_param("pointcloud_topic_name", TOPIC)
 
     def test_the_camera_is_subscribed_to_only_while_a_cloud_is_waited_for(self) -> None:
-        self.set_parameter("name_prefix", "")
         until(lambda: not self.camera.watched, "the camera without a subscriber")
         seen = []
 
@@ -173,7 +172,6 @@ class TestPointCloudGrasps(GraspGeneratorConformance):
         assert not answers
         self.scene.objects.append(box)
         task.join(60.0)
-        self.set_parameter("scene_timeout", 1.0)
         assert answers and answers[0][0], answers
 
     def test_what_the_scene_does_not_know_is_found_in_the_cloud(self) -> None:

@@ -21,7 +21,6 @@ class TestTopDownGrasps(GraspGeneratorConformance):
     def test_the_best_grasp_of_a_box_is_over_its_centre_and_open_a_little_wider(self) -> None:
         self.scene.objects = self.scene.objects[:1]
         self.scene.add_box("box__link", BOX_SIZE, (0.05, 0.5, BOX_Z))
-        self.set_parameter("name_prefix", "")
         assert self.generate()[0]
         best = next_grasp().grasp_message
         place = best.grasp.pose.pose.position

@@ -9,7 +9,7 @@ starts the node of the generator beside the managers and a fake move_group, whos
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,7 @@ def _pose(stage: Any) -> tuple[NDArray[np.float64], Rotation]:
 
 
 class GraspGeneratorConformance:
-    """Tests of one grasp generator. The tests build on each other and run in their order.
+    """Tests of one grasp generator. The tests run in their order, because the first two add the objects of the scene.
 
     Attributes:
         package: Package of the generator.
@@ -142,9 +142,27 @@ class GraspGeneratorConformance:
   <node name="{suite.node}" pkg="{suite.package}" type="{suite.node}" required="true" output="screen"/></launch>"""
         )
 
+    @pytest.fixture(autouse=True)
+    def restored_parameters(self) -> Iterator[None]:
+        """Restores the parameters after each test."""
+        self._previous: dict[str, Any] = {}
+        yield
+        for path, value in self._previous.items():
+            if value is None:
+                rospy.delete_param(path)
+            else:
+                rospy.set_param(path, value)
+
     def set_parameter(self, name: str, value: object) -> None:
-        """Sets a private parameter of the generator, which reads its parameters at each generation."""
-        rospy.set_param(f"{self.node}/{name}", value)
+        """Sets a private parameter of the generator for the present test.
+
+        Args:
+            name: Name of the parameter, which the generator reads at each generation.
+            value: Value of the parameter.
+        """
+        path = f"{self.node}/{name}"
+        self._previous.setdefault(path, rospy.get_param(path, None))
+        rospy.set_param(path, value)
 
     def generate(self) -> tuple[bool, str]:
         """Lets the generator generate grasps; returns success and message."""
@@ -231,7 +249,6 @@ class GraspGeneratorConformance:
         assert not responses
         self.scene.objects.append(box)
         task.join(60.0)
-        self.set_parameter("scene_timeout", 1.0)
         assert responses
         assert responses[0][0], responses
 
@@ -285,7 +302,6 @@ class GraspGeneratorConformance:
 
     def test_an_object_that_returns_under_its_name_gives_new_grasps(self) -> None:
         """The generator has seen the scene without the object before the object returns elsewhere."""
-        self.set_parameter("object_name", "")
         self.set_parameter("name_prefix", "again_")
         self.scene.objects = [item for item in self.scene.objects if item.id != "box__link"]
         before = self.scene.scene_requests
