@@ -241,5 +241,25 @@ def test_the_load_counts_other_processes_and_not_those_of_the_run(monkeypatch: p
     assert share_of("mine/other/") == 0.0
 
 
+def test_a_process_of_the_run_whose_program_is_being_loaded_does_not_count_as_load(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Linux shows an empty environment of such a process; here the first reads do."""
+    monkeypatch.setenv(RUN_ID_VARIABLE, "mine/worker/")
+    read_bytes, reads = Path.read_bytes, []
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as process:
+
+        def read_while_loading(path: Path) -> bytes:
+            if path == Path(f"/proc/{process.pid}/environ"):
+                reads.append(path)
+                return b"" if len(reads) <= 3 else read_bytes(path)
+            return read_bytes(path)
+
+        monkeypatch.setattr(Path, "read_bytes", read_while_loading)
+        others = MachineLoad.now().others_s
+        process.kill()
+    assert process.pid not in others
+
+
 def test_the_reference_workload_takes_the_same_for_all_episodes_of_a_process() -> None:
     assert 0.001 < reference_s() == reference_s()

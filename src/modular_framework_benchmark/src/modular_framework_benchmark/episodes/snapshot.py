@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 import rospkg
 
+from modular_framework_core.launching.launch_session import environment_of
+
 RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
 """Python packages whose versions affect results."""
 
@@ -160,7 +162,7 @@ def _others_s() -> dict[int, float]:
 
 def _is_of_run(process_folder: Path, run: bytes) -> bool:
     try:
-        environment = (process_folder / "environ").read_bytes()
+        environment = environment_of(process_folder)
     except PermissionError:  # the process of a different user
         return False
     return any(variable.startswith(run) for variable in environment.split(b"\0"))

@@ -53,7 +53,7 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
     mark, process_ids = f"{variable}={value}".encode(), set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # process ended or belongs to another user
-            entries = _environment(folder).split(b"\0")
+            entries = environment_of(folder).split(b"\0")
             marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
             if marked and int(folder.name) != os.getpid():
                 process_ids.add(int(folder.name))
@@ -63,13 +63,16 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
     return sorted(process_ids - {os.getpid()})
 
 
-def _environment(process: Path) -> bytes:
-    """Returns the environment of a process.
+def environment_of(process: Path) -> bytes:
+    """Returns the environment of a process, entries separated by zero bytes.
 
     Linux shows an empty environment while it loads the program of a new process, so an empty one is read again.
 
     Args:
         process: Folder of the process in /proc.
+
+    Raises:
+        OSError: The process has ended, or belongs to another user.
     """
     end_s = time.monotonic() + LOADING_S
     while not (entries := (process / "environ").read_bytes()) and time.monotonic() < end_s:

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_core.launching.launch_session import processes_with
 from modular_framework_testing.ros_session import Launch, RosSession
 
 STOPPED_WITHIN_S = 1.0
@@ -197,12 +198,10 @@ def _until_it_moves(launch: Launch, speeds: Path) -> None:
 
 def _left(session: RosSession, watcher: int) -> tuple[str, ...]:
     """Returns the command lines of the remaining processes of the session, without the watcher."""
-    mark = f"ROS_MASTER_URI={session.env['ROS_MASTER_URI']}".encode()
     found = []
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and int(folder.name) not in (watcher, os.getpid()):
-            with contextlib.suppress(OSError):
-                if mark in (folder / "environ").read_bytes().split(b"\0"):
-                    command = (folder / "cmdline").read_bytes().replace(b"\0", b" ")
-                    found.append(command.decode(errors="replace").strip())
+    for process in processes_with("ROS_MASTER_URI", session.env["ROS_MASTER_URI"]):
+        with contextlib.suppress(OSError):  # the process has ended
+            command = Path(f"/proc/{process}/cmdline").read_bytes().replace(b"\0", b" ")
+            if process != watcher:
+                found.append(command.decode(errors="replace").strip())
     return tuple(found)
