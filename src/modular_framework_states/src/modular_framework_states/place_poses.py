@@ -236,11 +236,11 @@ def place_poses(
         if not region.z[0] <= height <= region.z[1]:
             excess.append(math.inf)
             continue
-        height += limits.gap_m
         for point, stance in itertools.product(points, stances):
             excess.append(face.excess(stance.feet + point))
             if excess[-1] <= limits.overhang_m + 1.0e-9:
-                poses.append(PlacePose(np.array([*point, height]) - stance.rotation.apply(centre), stance.rotation))
+                release = np.array([*point, height + limits.gap_m])
+                poses.append(PlacePose(release - stance.rotation.apply(centre), stance.rotation))
     if min(excess) == math.inf:
         low, high = region.z
         raise PlaceError(f"the centre of the object would be at z = {height:.3f} m; allowed: {low:g} to {high:g} m")

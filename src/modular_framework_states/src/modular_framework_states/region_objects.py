@@ -24,7 +24,7 @@ def objects_in_region(objects: Iterable[SceneObject], region: TargetRegion) -> l
 
 
 class ObjectSelection:
-    """Selects the least often selected object; the selections count anew once fewer objects are left.
+    """Selects the least often selected object; the counts restart at 0 once fewer objects are left.
 
     Args:
         max_selections: Maximum number of selections of an object while no object leaves.
