@@ -46,3 +46,10 @@ def test_a_member_that_does_not_exist_is_named(member: str, words: str) -> None:
 def test_a_frame_above_itself_ends_a_chain() -> None:
     with pytest.raises(GroupError, match="'base' is not below link 'map'"):
         KinematicTree({"virtual": ("base", "base")}).chain("map", "base")
+
+
+def test_a_cycle_of_joints_ends_a_chain() -> None:
+    circle = KinematicTree({"a": ("l1", "l2"), "b": ("l2", "l3"), "c": ("l3", "l1")})
+    assert circle.chain("l1", "l3") == ["a", "b"]
+    with pytest.raises(GroupError, match="'l1' is not below link 'base'"):
+        circle.chain("base", "l1")

@@ -25,9 +25,11 @@ class KinematicTree:
         self._joints = links_of.keys()
 
     def up(self, link: str) -> Iterator[tuple[str, str]]:
-        """Yields the joints from a link up to the root, each with its parent link."""
-        while link in self._above and self._above[link][1] != link:  # a virtual joint may connect equal names
+        """Yields the joints from a link up to the root, each with its parent link; a cycle of joints only once."""
+        below = {link}
+        while link in self._above and self._above[link][1] not in below:  # a virtual joint may connect equal names
             joint, link = self._above[link]
+            below.add(link)
             yield joint, link
 
     def chain(self, base: str, tip: str) -> list[str]:

@@ -7,6 +7,7 @@ import rospy
 from visualization_msgs.msg import Marker
 
 from modular_framework_core.task_runner.task_runner import TaskResult
+from modular_framework_urdf.planning_groups import KinematicTree
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -76,9 +77,8 @@ def _first_joint(description: str) -> Joint | None:
         joints = read_urdf(description).joints if description else ()
     except XmlError:  # move_group reports the fault
         return None
-    parents = {joint.child: joint for joint in joints}
-
-    def is_moved(joint: Joint | None) -> bool:
-        return joint is not None and (joint.is_movable or is_moved(parents.get(joint.parent)))
-
-    return next((item for item in joints if item.is_movable and not is_moved(parents.get(item.parent))), None)
+    tree = KinematicTree({joint.name: (joint.parent, joint.child) for joint in joints})
+    movable = {joint.name: joint for joint in joints if joint.is_movable}
+    return next(
+        (joint for joint in movable.values() if not any(above in movable for above, _ in tree.up(joint.parent))), None
+    )
