@@ -169,7 +169,10 @@ def test_what_is_held_stays_held_when_the_goal_is_over_and_when_the_cable_was_ou
 
 def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
-    go(loop, 1.5)
+    assert go(loop, 1.5).status is GoalStatus.SUCCEEDED
+    handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
+    # the goal succeeds as fast fingers pass it, and they may overshoot where an object was removed
+    loop.run(lambda: abs(handle.position - 1.5) < 0.03 and abs(handle.velocity) < 0.02)
     if "swing" not in loop.controllers:
         loop.manager.load_controller("swing")
     loop.switch(["swing"], ["grip"])
