@@ -1,10 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Public name of the base class of entities."""
 
-from __future__ import annotations
-
-from launch.core.launch_description_entity import LaunchDescriptionEntity
-
-__all__ = [
-    "LaunchDescriptionEntity",
-]
+from launch.core.launch_description_entity import LaunchDescriptionEntity as LaunchDescriptionEntity

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Alternative public module of parameter descriptions."""
 
-from __future__ import annotations
-
-from launch_ros.parameter_descriptions import Parameter, ParameterFile, ParameterValue
-
-__all__ = ["Parameter", "ParameterFile", "ParameterValue"]
+from launch_ros.parameter_descriptions import Parameter as Parameter
+from launch_ros.parameter_descriptions import ParameterFile as ParameterFile
+from launch_ros.parameter_descriptions import ParameterValue as ParameterValue
