@@ -8,11 +8,11 @@ import random
 
 import pytest
 from geometry_msgs.msg import Quaternion, Transform, Vector3
-from moveit_commander.base_joint import base_transform, base_values
 from moveit_commander.exception import MoveItCommanderException, RobotModelError
 from moveit_commander.joints import ASSUMED_ROOT_JOINT
 from moveit_commander.robot import Joint, Link, RobotCommander
 from moveit_commander.robot_model import RobotModel, group_values
+from moveit_commander.robot_state import base_transform, base_values
 
 URDF = """<robot name="tiny">
   <link name="base"/><link name="one"/><link name="two"/><link name="flange"/><link name="left"/><link name="right"/>

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jacobian and forward kinematics of a joint chain from the robot's description."""
+"""Kinematics of a joint chain from the robot's description: Jacobian, pose of a link, and nearest joint values."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from moveit_commander.joints import Joint
@@ -34,10 +36,44 @@ def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_p
     return np.column_stack(columns)
 
 
-def link_pose(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[Rotation, Any]:
-    """Returns the rotation and position [m] of the last link in the parent frame of the first joint."""
-    _, rotation, position = _walk(chain, positions)
-    return rotation, position
+def nearest_values(
+    chain: Sequence[Joint],
+    free: Sequence[Joint],
+    start: Mapping[str, float],
+    complete: Callable[[Mapping[str, float]], Mapping[str, float]],
+    *,
+    rotation: Rotation,
+    position: Any,
+) -> dict[str, float]:
+    """Returns joint positions within bounds with the smallest pose error that least squares find from a start.
+
+    Args:
+        chain: Joints from the base to the link, including fixed joints.
+        free: Joints that may move, without mimic joints.
+        start: Positions of the robot's joints [rad or m].
+        complete: Function that adds the positions of mimic joints.
+        rotation: Target rotation of the link in the base frame.
+        position: Target position of the link in the base frame, shape (3,) [m].
+
+    Returns:
+        Positions of the free joints. The error sums metres and radians, as in inverse kinematics.
+    """
+    bounds = {
+        joint.name: (-math.inf, math.inf) if joint.kind == "continuous" else (joint.lower, joint.upper)
+        for joint in free
+    }
+    begin = {joint.name: joint.bounded(start[joint.name]) for joint in free}
+    names = [name for name, (lower, upper) in bounds.items() if lower < upper]
+
+    def pose_error(values: Any) -> Any:
+        moved = complete({**start, **begin, **dict(zip(names, values, strict=True))})
+        _, reached_rotation, reached_position = _walk(chain, moved)
+        return np.concatenate([position - reached_position, (rotation * reached_rotation.inv()).as_rotvec()])
+
+    found = least_squares(
+        pose_error, [begin[name] for name in names], bounds=np.transpose([bounds[name] for name in names])
+    )
+    return begin | dict(zip(names, found.x.tolist(), strict=True))
 
 
 def _walk(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[list[tuple[Joint, Any, Any]], Rotation, Any]:

@@ -8,14 +8,16 @@ from collections.abc import Iterable, Mapping
 from enum import Enum, auto
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped
 from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 
 from modular_framework_urdf.mimics import with_leaders
 from moveit_commander import conversions
-from moveit_commander.approximate_kinematics import nearest_values, rotation_and_position
+from moveit_commander.chain_jacobian import nearest_values
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import code_text, forward_kinematics, held_frames
 from moveit_commander.group_settings import GroupSettings
@@ -196,12 +198,12 @@ class GroupJointTargets(GroupSettings):
         moved = [joint for joint in self._group.active_joints if joint.is_movable]
         base = next(joint.parent for joint in self._group.joints if joint.is_movable)
         base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
-        base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
-        rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))
+        base_rotation, base_position = _rotation_and_position(base_pose)
+        rotation, position = _rotation_and_position(pose.pose)
         if link not in self._model.links:
             holder = held_frames(self._servers)[link]
             held_pose = forward_kinematics(self._servers, holder, link, RobotState(is_diff=True)).pose
-            held_rotation, held_position = rotation_and_position(conversions.pose_to_list(held_pose))
+            held_rotation, held_position = _rotation_and_position(held_pose)
             link, rotation = holder, rotation * held_rotation.inv()
             position = position - rotation.apply(held_position)
         frame_to_base = base_rotation.inv()
@@ -232,3 +234,9 @@ def link_and_approximate(*arguments: Any) -> tuple[str, bool]:
                     "pose is approximate (bool) may follow a pose"
                 )
     return link, approximate
+
+
+def _rotation_and_position(pose: Pose) -> tuple[Rotation, Any]:
+    """Returns the rotation and the position [m] of a pose."""
+    values = conversions.pose_to_list(pose)
+    return Rotation.from_quat(values[3:]), np.array(values[:3])

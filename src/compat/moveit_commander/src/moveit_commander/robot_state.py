@@ -3,23 +3,25 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rospy
+from geometry_msgs.msg import Quaternion, Transform, Vector3
 from moveit_msgs.msg import RobotState
 from rosgraph.names import ns_join
 from sensor_msgs.msg import JointState
 
 from modular_framework_ros.parameter_search import nearest_parameter
-from moveit_commander.base_joint import base_transform, base_values
 from moveit_commander.exception import RobotModelError, ServerError
 from moveit_commander.robot_model import RobotModel
 from moveit_commander.roscpp_initializer import ensure_node, on_shutdown
 
 STATE_TIMEOUT_S = 1.0
+PLANAR = "planar"
 _shared: dict[tuple[str, str], CurrentState] = {}
 _shared_lock = threading.Lock()
 
@@ -165,3 +167,29 @@ class CurrentState:
             for name, position in zip(message.name, message.position, strict=False):
                 self._positions[name], self._arrivals[name] = position, now
             self._changed.notify_all()
+
+
+def base_values(model: RobotModel, transform: Transform) -> dict[str, float]:
+    """Returns the variables of the robot's base for a transform; a planar base uses only x, y and the heading.
+
+    Args:
+        model: Model of a robot with a planar or floating base.
+        transform: Transform from the root link to the parent frame of the base.
+    """
+    t, q = transform.translation, transform.rotation
+    if model.base is not None and model.base.kind == PLANAR:
+        heading = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+        values = [t.x, t.y, heading]
+    else:
+        values = [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+    return {variable.name: value for variable, value in zip(model.base_variables, values, strict=True)}
+
+
+def base_transform(model: RobotModel, positions: Mapping[str, float]) -> Transform:
+    """Returns the transform of the robot's base for the values of its variables; normalises the quaternion."""
+    values = [positions[variable.name] for variable in model.base_variables]
+    if model.base is not None and model.base.kind == PLANAR:
+        x, y, heading = values
+        return Transform(Vector3(x, y, 0.0), Quaternion(0.0, 0.0, math.sin(heading / 2.0), math.cos(heading / 2.0)))
+    length = math.hypot(*values[3:]) or 1.0
+    return Transform(Vector3(*values[:3]), Quaternion(*(number / length for number in values[3:])))
