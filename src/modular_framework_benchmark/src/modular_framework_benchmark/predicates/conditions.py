@@ -75,11 +75,6 @@ class ObjectCondition(Condition):
 
     object: str = name(KeyKind.OBJECT)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the name of the object."""
-        return (self.object,)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lifted(ObjectCondition):
@@ -168,11 +163,6 @@ class OnTopOf(ObjectCondition):
     tolerance: float = number(0.01, high=1.0)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the object and of the support."""
-        return (self.object, self.support)
-
-    @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"'{self.object}' lies on '{self.support}'"
@@ -224,11 +214,6 @@ class Inside(ObjectCondition):
 
     container: str = name(KeyKind.MODEL)
     tolerance: float = number(0.005, high=1.0)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the object and of the container."""
-        return (self.object, self.container)
 
     @property
     def statement(self) -> str:
@@ -326,11 +311,6 @@ class Aligned(PoseCondition):
     rpy: tuple[float, float, float] = vector(low=-6.2832, high=6.2832)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the object and of the model with the frame."""
-        return (self.object,) if self.relative_to == WORLD else (self.object, self.relative_to)
-
-    @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"'{self.object}' is at {self.position} m, {self.rpy} rad of '{self.relative_to}'"
@@ -367,11 +347,6 @@ class JointAtLeast(Condition):
     position: float = number(None, low=-1000.0, required=True)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the name of the model."""
-        return (self.model,)
-
-    @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
@@ -403,11 +378,6 @@ class Cleared(Condition):
     objects: tuple[str, ...] = name(KeyKind.OBJECTS)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the objects."""
-        return self.objects
-
-    @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"none of {', '.join(self.objects)} is in the region '{self.region.name}'"
@@ -435,11 +405,6 @@ class Collected(Condition):
     region: Region = name(KeyKind.REGION)
     objects: tuple[str, ...] = name(KeyKind.OBJECTS)
     count: int | None = whole_number(1)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the objects."""
-        return self.objects
 
     @property
     def wanted(self) -> int:
@@ -498,11 +463,6 @@ class NoContact(ObjectCondition):
     other: str = name(KeyKind.MODEL, ROBOT, default=ROBOT)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of both models."""
-        return (self.object,) if self.other == ROBOT else (self.object, self.other)
-
-    @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"'{self.object}' does not touch '{self.other}'"
@@ -552,11 +512,6 @@ class Stacked(Condition):
 
     objects: tuple[str, ...] = name(KeyKind.OBJECTS)
     tolerance: float = number(0.01, high=1.0)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Returns the names of the objects."""
-        return self.objects
 
     @property
     def statement(self) -> str:

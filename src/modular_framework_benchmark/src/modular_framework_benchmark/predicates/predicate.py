@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from modular_framework_benchmark.predicates.predicate_keys import number
+from modular_framework_benchmark.predicates.predicate_keys import model_names, number
 from modular_framework_benchmark.predicates.world_track import TIME_TOLERANCE_S, Flags, Floats, WorldTrack
 from modular_framework_benchmark.records.episode_settings import Tagged
 
@@ -76,9 +76,9 @@ class Condition(Predicate):
         return (stage.measurement_text(self) + (f" for less than {self.duration:g} s" if is_short else ""),)
 
     @property
-    @abstractmethod
     def names(self) -> tuple[str, ...]:
-        """Returns the names of the models that the condition is about."""
+        """Returns the names of the models that the condition is about, in the order of its keys."""
+        return model_names(self)
 
     @property
     @abstractmethod

@@ -82,3 +82,13 @@ def name(kind: KeyKind, *extra: str, default: str = "") -> Any:
 def keys_of(kind: type[Any]) -> dict[str, tuple[PredicateKey, Field[Any]]]:
     """Returns the keys of a class of conditions with their fields, keyed by name."""
     return {item.name: (item.metadata[_KEY], item) for item in fields(kind) if _KEY in item.metadata}
+
+
+def model_names(condition: Any) -> tuple[str, ...]:
+    """Returns the values of the keys that name models, without words such as `robot` that stand for no single model."""
+    found: list[str] = []
+    for key, (declared, _) in keys_of(type(condition)).items():
+        if declared.kind in (KeyKind.OBJECT, KeyKind.OBJECTS, KeyKind.MODEL):
+            value = getattr(condition, key)
+            found += [each for each in ([value] if isinstance(value, str) else value) if each not in declared.extra]
+    return tuple(found)
