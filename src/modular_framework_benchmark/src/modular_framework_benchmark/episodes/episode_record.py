@@ -29,7 +29,7 @@ from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.progress import Progress, progress_of
 from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json, from_json
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
@@ -83,27 +83,11 @@ class EpisodeEnd:
         """
         return replace(self, status=status, cause=cause, answer=answer)
 
-    def with_target(self, target: str) -> EpisodeEnd:
-        """Returns this end with the name of the object in the success criteria."""
-        return replace(self, target=target)
-
-    def with_cold_start_mark(self, is_cold: bool) -> EpisodeEnd:
-        """Returns this end with the mark of the first episode of a stack."""
-        return replace(self, is_cold=is_cold)
-
-    def with_video_fault(self, fault: str) -> EpisodeEnd:
-        """Returns this end with the reason for a missing video; "" if there is a video."""
-        return replace(self, answer={**self.answer, "video_fault": fault})
-
-    def with_stop_time(self, stop_s: float) -> EpisodeEnd:
-        """Returns this end with the duration of the shutdown [s]."""
-        return replace(self, stop_s=stop_s)
-
 
 def make_record(end: EpisodeEnd) -> EpisodeRecord:
     """Returns the record of an episode whose processes have all ended."""
     wall_s = time.monotonic() - end.begun_monotonic
-    software = UsedSoftware.from_parts(end.answer.get("ran", {}))
+    software = from_json(UsedSoftware, end.answer.get("ran", {}))
     if software.invalid_cause:
         end = end.with_status(EpisodeStatus.INVALID, software.invalid_cause, end.answer)
     recording = read_recording(end.folder)

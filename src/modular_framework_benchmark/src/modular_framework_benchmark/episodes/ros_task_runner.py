@@ -7,7 +7,7 @@ import json
 import shutil
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +60,7 @@ class TaskEpisodeRunner:
             self.close()
             return make_record(end.broken(str(error)))
         stack, is_cold = self._stack_for(launch)
-        end = end.with_cold_start_mark(is_cold).with_target(target)
+        end = replace(end, is_cold=is_cold, target=target)
         try:
             end = self._run_on(stack, settings, launch, end)
             if is_cold and _can_run_again(stack, settings, launch, end):
@@ -71,9 +71,9 @@ class TaskEpisodeRunner:
             stack.write_log(folder / "log.txt")
             if not (settings.warm and _can_restart(stack, launch, end)):
                 self.close()
-        end = end.with_stop_time(time.monotonic() - stop)
+        end = replace(end, stop_s=time.monotonic() - stop)
         if settings.record.video and "zero" in end.answer:
-            end = end.with_video_fault(make_video_apart(folder))
+            end = replace(end, answer={**end.answer, "video_fault": make_video_apart(folder)})
         return make_record(end)
 
     def close(self) -> None:

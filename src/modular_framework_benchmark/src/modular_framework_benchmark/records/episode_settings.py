@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar, get_args, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
 from modular_framework_benchmark.records.perturbation import ObjectPerturbation
 
@@ -178,7 +179,7 @@ def as_json(value: Any) -> Any:
 
 
 def from_json(kind: Callable[..., _T], content: Mapping[str, Any]) -> _T:
-    """Returns the dataclass whose JSON values `as_json` gave; ignores keys of another version.
+    """Returns the dataclass whose JSON values `as_json` or `dataclasses.asdict` gave; ignores keys of another version.
 
     Args:
         kind: Class of the result.
@@ -186,6 +187,7 @@ def from_json(kind: Callable[..., _T], content: Mapping[str, Any]) -> _T:
 
     Raises:
         TypeError: A required field is missing.
+        ValueError: A text is not a value of its enumeration.
     """
     hints = _hints(kind)
     return kind(**{name: _decode_value(hints[name], value) for name, value in content.items() if name in hints})
@@ -198,6 +200,11 @@ def _decode_value(hint: Any, value: Any) -> Any:
     if isinstance(value, list):
         return tuple(_decode_value(get_args(hint)[0], part) for part in value)
     hints = [item for item in (hint, *get_args(hint)) if isinstance(item, type)]
+    choices = next((item for item in hints if issubclass(item, Enum)), None)
+    if choices is not None:
+        return None if value is None else choices(value)
+    if get_origin(hint) is Mapping and is_dataclass(get_args(hint)[1]):
+        return {name: _decode_value(get_args(hint)[1], part) for name, part in value.items()}
     if isinstance(value, Mapping) and any(issubclass(item, Tagged) for item in hints):
         ((name, content),) = value.items()
         return from_json(Tagged.kinds[name], content)

@@ -78,19 +78,6 @@ class UsedSoftware:
         """Returns the entries of a snapshot."""
         return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
 
-    @classmethod
-    def from_parts(cls, parts: Mapping[str, Any]) -> UsedSoftware:
-        """Returns the object from JSON values that `dataclasses.asdict` produced in another process."""
-        return cls(
-            **{
-                **parts,
-                "planners": {name: UsedPlanner(**planner) for name, planner in parts.get("planners", {}).items()},
-                "methods": {name: UsedMethod(**method) for name, method in parts.get("methods", {}).items()},
-                "substitutions": tuple(parts.get("substitutions", ())),
-                "replaced": tuple(parts.get("replaced", ())),
-            }
-        )
-
     def with_plans(self, runs: Iterable[PlannerRun]) -> UsedSoftware:
         """Returns this object with the planners of the given runs.
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from dataclasses import asdict, fields
 from typing import Any
 
 from sqlalchemy import Connection, Row, column, insert, select, table, update
@@ -117,17 +118,9 @@ def _number(value: float | None) -> float | None:
 
 
 def _span_row(run: int, index: int, span: Span) -> dict[str, Any]:
-    return {
-        "runid": run,
-        "place": index,
-        "kind": span.kind,
-        "name": span.name,
-        "started_s": float(span.started_s),
-        "ended_s": _number(span.ended_s),
-        "outcome": span.outcome,
-        "failed": bool(span.failed),
-        "reason": span.reason,
-    }
+    """Returns the row of a span in `spans`; numbers may be NumPy's."""
+    times = {"started_s": float(span.started_s), "ended_s": _number(span.ended_s)}
+    return {"runid": run, "place": index, **asdict(span), **times, "failed": bool(span.failed)}
 
 
 def _snapshot_value(connection: Connection, name: str, value: Any) -> int:
@@ -179,7 +172,8 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
     if run is None:
         return None
     record_row = connection.execute(select(RECORDS).where(RECORDS.c.runid == row.id)).one()
-    spans = connection.execute(select(SPANS).where(SPANS.c.runid == row.id).order_by(SPANS.c.place))
+    parts = (SPANS.c[item.name] for item in fields(Span))
+    spans = connection.execute(select(*parts).where(SPANS.c.runid == row.id).order_by(SPANS.c.place)).mappings()
     status = next(each for each, value in STATUS_VALUES.items() if value == run["status"])
     return EpisodeRecord(
         spec=read_spec(row, description.mode),
@@ -190,18 +184,7 @@ def read_record(connection: Connection, row: Row[Any], description: ExperimentDe
         wall_s=run["wall_s"],
         simulated_s=run["simulated_s"],
         metrics={name: None if run[name] is None else float(run[name]) for name in names},
-        spans=tuple(
-            Span(
-                each.kind,
-                each.name,
-                each.started_s,
-                each.ended_s,
-                each.outcome,
-                failed=bool(each.failed),
-                reason=each.reason,
-            )
-            for each in spans
-        ),
+        spans=tuple(Span(**each) for each in spans),
         snapshot=_read_snapshot(connection, json.loads(record_row.snapshot)),
         folder=record_row.folder,
         worker=record_row.worker,

@@ -5,16 +5,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
 
 from modular_framework_benchmark.experiments.modes import stored_settings
-from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.episode_settings import as_json
-from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind
-from modular_framework_ros.reported_figures import Clock, Source
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import as_json, from_json
+from modular_framework_benchmark.records.experiment import ExperimentDescription
 
 
 def to_json(value: Any) -> str:
@@ -49,42 +48,13 @@ def description_to_json(description: ExperimentDescription) -> str:
 
 def description_from_json(text: str) -> ExperimentDescription:
     """Returns the description from the text of `description_to_json`."""
-    content = json.loads(text)
-    factors = tuple(Factor(each["name"], tuple(each["levels"])) for each in content.pop("factors"))
-    metrics = tuple(
-        Metric(
-            **{
-                **each,
-                "kind": MetricKind(each["kind"]),
-                "better": Direction(each["better"]),
-                "clock": None if each["clock"] is None else Clock(each["clock"]),
-                "source": Source(each["source"]),
-            }
-        )
-        for each in content.pop("metrics")
-    )
-    return ExperimentDescription(**content, factors=factors, metrics=metrics)
+    return from_json(ExperimentDescription, json.loads(text))
 
 
 def record_to_json(record: EpisodeRecord) -> str:
     """Returns a record and its episode's specification as JSON."""
-    spec = record.spec
-    return to_json(
-        {
-            "spec": {name: getattr(spec, name) for name in ("number", "configuration", "trial", "seed", "settings")},
-            "status": record.status,
-            "outcome": record.outcome,
-            "cause": record.cause,
-            "begun": record.begun,
-            "wall_s": record.wall_s,
-            "simulated_s": record.simulated_s,
-            "metrics": record.metrics,
-            "spans": [asdict(span) for span in record.spans],
-            "snapshot": record.snapshot,
-            "folder": record.folder,
-            "worker": record.worker,
-        }
-    )
+    content = {item.name: getattr(record, item.name) for item in fields(record)}
+    return to_json(content | {"spans": [asdict(span) for span in record.spans]})
 
 
 def record_from_json(content: Mapping[str, Any], mode: str) -> EpisodeRecord:
@@ -96,14 +66,8 @@ def record_from_json(content: Mapping[str, Any], mode: str) -> EpisodeRecord:
 
     Raises:
         ValueError: A status is unknown.
-        KeyError, TypeError: A field is missing or unknown.
+        KeyError, TypeError: A field is missing.
     """
     spec = content["spec"]
-    return EpisodeRecord(
-        **{
-            **content,
-            "spec": EpisodeSpec(**{**spec, "settings": stored_settings(mode, spec["settings"])}),
-            "status": EpisodeStatus(content["status"]),
-            "spans": tuple(Span(**span) for span in content["spans"]),
-        }
-    )
+    settings = stored_settings(mode, spec["settings"])
+    return from_json(EpisodeRecord, {**content, "spec": EpisodeSpec(**{**spec, "settings": settings})})
