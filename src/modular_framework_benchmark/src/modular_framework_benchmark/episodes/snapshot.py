@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import rospkg
 
 from modular_framework_core.launching.launch_session import environment_of
@@ -32,22 +34,24 @@ RUN_ID_VARIABLE = "MODULAR_FRAMEWORK_RUN"
 @functools.cache
 def versions() -> dict[str, Any]:
     """Returns the git revision of this software and the versions of its environment; constant within a process."""
-    package_versions = {}
-    for name in RECORDED_PACKAGES:
-        try:
-            package_versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            package_versions[name] = ""
     return {
         "version": _git("describe", "--always", "--dirty", "--tags"),
         "git_revision": _git("rev-parse", "HEAD"),
         "git_changed": bool(_git("status", "--porcelain", "--untracked-files=no")),
         "python": platform.python_version(),
         "ros_distribution": os.environ.get("ROS_DISTRO", ""),
-        "packages": package_versions,
+        "packages": {name: package_version(name) for name in RECORDED_PACKAGES},
         "ros_packages": {name: _ros_version(name) for name in ROS_PACKAGES},
         "environment": _environment_digest(),
     }
+
+
+def package_version(name: str) -> str:
+    """Returns the version of a Python package, "" for a missing package."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _ros_version(package: str) -> str:
@@ -78,13 +82,14 @@ def _git(*arguments: str) -> str:
 @functools.cache
 def machine() -> dict[str, Any]:
     """Returns the properties of the machine."""
-    cpu_names = [line.partition(":")[2].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
+    lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+    cpu_names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return {
         "host": platform.node(),
         "cpu": cpu_names[0] if cpu_names else platform.processor(),
         "cores": len(os.sched_getaffinity(0)),
         "kernel": platform.release(),
-        "memory_kb": int(next((line.split()[1] for line in _lines("/proc/meminfo")), "0")),
+        "memory_kb": psutil.virtual_memory().total // 1024,
     }
 
 
@@ -122,11 +127,10 @@ class MachineLoad:
 
     @classmethod
     def now(cls) -> MachineLoad:
-        """Reads the counters from /proc."""
-        ticks = [float(value) / _TICKS_PER_S for value in _lines("/proc/stat")[0].split()[1:]]
-        stolen_s = ticks[7] if len(ticks) > 7 else 0.0
-        busy_s = sum(ticks[:3]) + sum(ticks[5:8])
-        return cls(time.monotonic(), os.getloadavg()[0], busy_s, stolen_s, _others_s())
+        """Reads the counters."""
+        times = psutil.cpu_times()
+        busy_s = times.user + times.nice + times.system + times.irq + times.softirq + times.steal
+        return cls(time.monotonic(), os.getloadavg()[0], busy_s, times.steal, _others_s())
 
     def since(self, before: MachineLoad) -> dict[str, float]:
         """Returns the load since an earlier moment; `others_share` is the machine fraction used by other processes."""
@@ -141,22 +145,15 @@ class MachineLoad:
         }
 
 
-_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-
-
 def _others_s() -> dict[int, float]:
     """Returns the processor time of each process outside this run [s], keyed by process id."""
     excluded, times_s = {os.getpid(), os.getppid()}, {}
     run = f"{RUN_ID_VARIABLE}={os.environ.get(RUN_ID_VARIABLE, '').partition('/')[0]}".encode()
-    for folder in Path("/proc").iterdir():
-        try:
-            if not folder.name.isdigit() or int(folder.name) in excluded or _is_of_run(folder, run):
-                continue
-            # The process name, in parentheses, may contain spaces.
-            fields = (folder / "stat").read_text(errors="replace").rpartition(")")[2].split()
-            times_s[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS_PER_S
-        except OSError:  # the process has ended
-            continue
+    for process in psutil.process_iter():
+        with contextlib.suppress(OSError, psutil.Error):  # the process has ended
+            if process.pid not in excluded and not _is_of_run(Path(f"/proc/{process.pid}"), run):
+                times = process.cpu_times()
+                times_s[process.pid] = times.user + times.system
     return times_s
 
 
@@ -166,7 +163,3 @@ def _is_of_run(process_folder: Path, run: bytes) -> bool:
     except PermissionError:  # the process of a different user
         return False
     return any(variable.startswith(run) for variable in environment.split(b"\0"))
-
-
-def _lines(path: str) -> list[str]:
-    return Path(path).read_text(errors="replace").splitlines()

@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ from modular_framework_benchmark.episodes.ros_file_digests import (
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest, tree_files
 from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTION_PARAMETERS, MODEL_PATH, WORLD
 from modular_framework_benchmark.episodes.ros_stack_launch import StackPreview, preview_stack
-from modular_framework_benchmark.episodes.snapshot import RECORDED_PACKAGES
+from modular_framework_benchmark.episodes.snapshot import RECORDED_PACKAGES, package_version
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.metric_choices import metric_files
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
@@ -106,16 +105,9 @@ def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Dige
 
 def _library_digests() -> Digests:
     for name in RECORDED_PACKAGES:
-        yield f"Python package {name}", _python_version(name)
+        yield f"Python package {name}", package_version(name) or "none"
     for name in LIBRARY_PACKAGES:
         yield from _package_digests(name)
-
-
-def _python_version(name: str) -> str:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "none"
 
 
 def _package_digests(package: str) -> Digests:
