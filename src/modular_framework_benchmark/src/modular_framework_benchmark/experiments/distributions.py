@@ -17,27 +17,6 @@ DRAW_DIGITS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Fixed:
-    """A constant."""
-
-    value: float
-
-    @property
-    def low(self) -> float:
-        """Returns the smallest number."""
-        return self.value
-
-    @property
-    def high(self) -> float:
-        """Returns the largest number."""
-        return self.value
-
-    def draw(self, generator: random.Random) -> float:
-        """Returns the constant."""
-        return self.value
-
-
-@dataclass(frozen=True, slots=True)
 class Uniform:
     """A uniform distribution."""
 
@@ -73,7 +52,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A uniform choice among given numbers."""
+    """A uniform choice among given numbers; a single number is a constant."""
 
     values: tuple[float, ...]
 
@@ -92,7 +71,7 @@ class Choice:
         return generator.choice(self.values)
 
 
-Distribution = Fixed | Uniform | Normal | Choice
+Distribution = Uniform | Normal | Choice
 
 
 def read_distribution(node: Node, what: str, reading: Reading) -> Distribution | None:
@@ -110,7 +89,7 @@ def read_distribution(node: Node, what: str, reading: Reading) -> Distribution |
         case Scalar():
             value = reading.number(node, what) if isinstance(node.value, (int, float)) else None
             if value is not None:
-                return Fixed(value)
+                return Choice((value,))
             if not isinstance(node.value, (int, float)):
                 reading.faults.add(node.location, f"{what} must be {ALLOWED_DISTRIBUTIONS}, found {kind_of(node)}")
             return None

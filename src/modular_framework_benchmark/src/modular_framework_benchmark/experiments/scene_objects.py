@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.distributions import (
+    Choice,
     Distribution,
-    Fixed,
     generator_of,
     read_distribution,
 )
@@ -82,7 +82,7 @@ class SceneObject:
             draw: Index of the draw, if earlier draws were too near to other objects.
         """
         key = (*key, "objects", index, *((draw,) if draw else ()))
-        numbers = {name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, name)) for name in POSE_KEYS}
+        numbers = {name: self.pose.get(name, Choice((0.0,))).draw(generator_of(*key, name)) for name in POSE_KEYS}
         scale = self._scale(key)
         if self.surface is not None:
             surface = self.surface.draw(generator_of(*key, OLD_SURFACE))
