@@ -9,9 +9,11 @@ import signal
 import sys
 from dataclasses import dataclass
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from modular_framework_benchmark.commands.mode_runners import runner_factory
-from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
+from modular_framework_benchmark.experiments.experiment import Stopping, StoppingKind
+from modular_framework_benchmark.experiments.experiment_file import read_run_settings
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.connection import parse_address, shown_target
 from modular_framework_benchmark.results.database import ResultDatabase
@@ -19,6 +21,9 @@ from modular_framework_benchmark.scheduling.disk_guard import GB, DiskGuard
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
 from modular_framework_benchmark.scheduling.progress import Progress
+
+if TYPE_CHECKING:
+    from modular_framework_benchmark.statistics.stopping import StoppingRule
 
 EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 COMMAND = "rosrun modular_framework_benchmark"
@@ -51,16 +56,13 @@ class ExperimentSession:
         number: Identifier of the experiment in the database.
         run: Mark of the run's processes.
         options: Options of the run.
-        settings: Workers and stopping rule of the experiment.
     """
 
-    def __init__(
-        self, database: ResultDatabase, number: int, run: str, options: SessionOptions, settings: RunSettings
-    ) -> None:
+    def __init__(self, database: ResultDatabase, number: int, run: str, options: SessionOptions) -> None:
         (self._stored,) = (stored for stored in database.experiments() if stored.id == number)
         self._database, self._number, self._run_mark, self._options = database, number, run, options
         description = self._stored.description
-        self._settings = settings
+        self._settings = read_run_settings(description.text, description.metrics)
         self._name = description.name
         self._shown = shown_target(options.target)
         path = parse_address(options.target).path
@@ -70,7 +72,7 @@ class ExperimentSession:
     def run(self) -> int:
         """Runs the episodes and prints the results; returns the exit code."""
         make_runner = runner_factory(self._stored.description.mode, self._options.runner)
-        rule = stopping_rule(self._settings.stopping)
+        rule = _stopping_rule(self._settings.stopping)
         disk = DiskGuard(self._folder, self._options.disk_limit_gb * GB)
         run = ExperimentRun(self._database, self._number, self._folder, rule, disk)
         progress = Progress(self._stored.planned, self._stored.finished, sys.stderr)
@@ -126,6 +128,18 @@ class ExperimentSession:
             print(f"error: {reason}", file=sys.stderr)
             return EXIT_FAILED
         return 0
+
+
+def _stopping_rule(stopping: Stopping) -> StoppingRule | None:
+    """Returns the stopping rule of an experiment, or None for a fixed number of trials."""
+    match stopping.kind:
+        case StoppingKind.FIXED:
+            return None
+        case StoppingKind.SEQUENTIAL:
+            # Imported here, because the statistics are slow to import.
+            from modular_framework_benchmark.statistics.stopping import AnytimeValid
+
+            return AnytimeValid(stopping.metric, stopping.smallest_difference)
 
 
 class _InterruptHandler:

@@ -13,7 +13,6 @@ import rospkg
 
 from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
 from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics, setting_checks
-from modular_framework_benchmark.commands.stopping_rules import run_settings_of
 from modular_framework_benchmark.experiments.design import design_text, digest_of, plan_episodes
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
@@ -128,28 +127,24 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
     with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
         ran_with = run_digests(episodes)
         number = database.add_experiment(experiment.describe(digest_of(experiment, episodes), ran_with), episodes)
-        return _make_session(database, number, lock, options, experiment).run()
+        return _make_session(database, number, lock, options).run()
 
 
 def _resume(options: argparse.Namespace) -> int:
     with RunLock(options.database) as lock, open_database(options.database) as database:
         number = _find_unfinished_experiment(database, options.experiment, options.database)
         database.check_resumed(number, run_digests(database.pending(number)))
-        return _make_session(database, number, lock, _session_options(options, options.database), None).run()
+        return _make_session(database, number, lock, _session_options(options, options.database)).run()
 
 
 def _session_options(options: argparse.Namespace, target: str) -> SessionOptions:
     return SessionOptions(target, options.workers, options.scheduler, options.runner, options.disk_limit)
 
 
-def _make_session(
-    database: ResultDatabase, number: int, lock: RunLock, options: SessionOptions, experiment: Experiment | None
-) -> ExperimentSession:
+def _make_session(database: ResultDatabase, number: int, lock: RunLock, options: SessionOptions) -> ExperimentSession:
     if lock.ended_processes:
         print(f"ended {lock.ended_processes} processes of an earlier run", file=sys.stderr)
-    (description,) = (stored.description for stored in database.experiments() if stored.id == number)
-    settings = run_settings_of(experiment, description)
-    return ExperimentSession(database, number, lock.run, options, settings)
+    return ExperimentSession(database, number, lock.run, options)
 
 
 def _find_unfinished_experiment(database: ResultDatabase, name: str | None, target: str) -> int:

@@ -38,6 +38,14 @@ class Stopping:
 
 
 @dataclass(frozen=True, slots=True)
+class RunSettings:
+    """Execution settings of an experiment, which do not determine its episodes."""
+
+    workers: int
+    stopping: Stopping
+
+
+@dataclass(frozen=True, slots=True)
 class Combination:
     """A combination of one level per factor, with the resulting settings.
 

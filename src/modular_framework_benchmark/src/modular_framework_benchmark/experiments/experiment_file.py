@@ -11,7 +11,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.experiments.experiment import Combination, Experiment, Stopping, StoppingKind
+from modular_framework_benchmark.experiments.experiment import (
+    Combination,
+    Experiment,
+    RunSettings,
+    Stopping,
+    StoppingKind,
+)
 from modular_framework_benchmark.experiments.factor_reading import (
     Levels,
     combined_settings,
@@ -373,15 +379,12 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
     return Stopping(kind, **{key: value for key, value in values.items() if value is not None})
 
 
-def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> tuple[int, Stopping]:
+def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> RunSettings:
     """Reads the execution settings, which do not determine the episodes, from the text of a checked experiment.
 
     Args:
         text: Text of the experiment file.
         metrics: Metrics of the experiment.
-
-    Returns:
-        The number of workers and the stopping rule.
 
     Raises:
         ExperimentFault: The stored text is invalid.
@@ -395,7 +398,7 @@ def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> tuple[int, Stop
     stopping = read_stopping(node, metrics, reading) if isinstance(node, Mapping) else Stopping()
     if len(faults):
         raise ExperimentFault(faults.sorted_faults())
-    return workers or 1, stopping
+    return RunSettings(workers or 1, stopping)
 
 
 def _keys_of_all_modes() -> tuple[str, ...]:
