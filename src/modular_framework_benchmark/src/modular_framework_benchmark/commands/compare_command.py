@@ -9,11 +9,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from modular_framework_benchmark.commands.reporting import run_reporting
+from modular_framework_benchmark.commands.reporting import run_reporting, write_file
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.regression import Change, compare_experiments
 from modular_framework_benchmark.reports.regression_page import regression_page, regression_text
-from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import open_source
 from modular_framework_benchmark.reports.run_record import content_differences, differences_of
 

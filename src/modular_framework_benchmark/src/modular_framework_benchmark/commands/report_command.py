@@ -8,13 +8,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from modular_framework_benchmark.commands.reporting import database_parser, run_reporting
+from modular_framework_benchmark.commands.reporting import database_parser, run_reporting, write_file
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.html_page import report_page
 from modular_framework_benchmark.reports.image_export import FORMATS, figure_image, find_browser, find_figure
 from modular_framework_benchmark.reports.paper_tables import latex_table, markdown_table
 from modular_framework_benchmark.reports.report_content import ReportContent, gather_content
-from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import OpenedExperiment, open_source
 from modular_framework_benchmark.reports.tables import answer_text, overview_table
 

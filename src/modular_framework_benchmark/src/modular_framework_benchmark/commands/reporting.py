@@ -6,9 +6,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.errors import ResultsError
+from modular_framework_core.files.atomic_files import write_atomically
 
 EXIT_NOT_REPORTED = 2
 
@@ -39,3 +41,15 @@ def run_reporting(
     except (ReportError, ResultsError) as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return EXIT_NOT_REPORTED
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Writes a file; an existing file is kept until the new file is complete.
+
+    Raises:
+        ReportError: The file is not writable.
+    """
+    try:
+        write_atomically(path, content)
+    except OSError as error:
+        raise ReportError(f"{path}: {error.strerror}") from error

@@ -7,10 +7,14 @@ Plotly interprets some HTML in every text, so each text from a database passes t
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import plotly.graph_objects as go
+
+from modular_framework_benchmark.statistics.comparison import Estimate
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6B3A", "#5B5B5B")  # Okabe and Ito's
 DASHES = ("solid", "dash", "dot", "dashdot")
@@ -121,3 +125,27 @@ def unique_labels(names: Sequence[str], max_length: int = MAX_LABEL_LENGTH) -> l
             text += " ′"
         labels.append(text)
     return labels
+
+
+def whiskers(estimates: Sequence[Estimate], scale: float, color: str, **line: float) -> dict[str, Any]:
+    """Returns the error bars of estimates with intervals; infinite ends are not drawn.
+
+    Args:
+        estimates: Estimates, some of them perhaps without an interval.
+        scale: Units of the axis per unit of the estimates.
+        color: Colour.
+        **line: Further settings of the bars, such as their width [px].
+    """
+
+    def lengths(factor: float, ends: Sequence[float]) -> list[float]:
+        parts = zip(estimates, ends, strict=True)
+        return [factor * (end - part.value) if math.isfinite(end) else 0.0 for part, end in parts]
+
+    return {
+        "type": "data",
+        "symmetric": False,
+        "color": color,
+        "array": lengths(scale, [part.interval.high if part.interval else part.value for part in estimates]),
+        "arrayminus": lengths(-scale, [part.interval.low if part.interval else part.value for part in estimates]),
+        **line,
+    }

@@ -14,12 +14,14 @@ from modular_framework_benchmark.reports.figure_style import (
     apply_style,
     spaced_words,
     unique_labels,
+    whiskers,
 )
 from modular_framework_benchmark.reports.html_page import render_page
 from modular_framework_benchmark.reports.number_text import count_phrase, number_text, p_value_text
 from modular_framework_benchmark.reports.regression import Change, MetricChange, Regression
 from modular_framework_benchmark.reports.report_content import plain_json
 from modular_framework_benchmark.reports.tables import Cell, Table, metric_title, pairs_text, table_text, wins_text
+from modular_framework_benchmark.statistics.comparison import Estimate
 
 COLOR_OF_CHANGE = {Change.BETTER: "#176639", Change.WORSE: "#b3261e"}
 DIFFERENCES_TITLE = "The runs also differ in the following, which may cause a change"
@@ -123,12 +125,8 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
 
 def _figure(regression: Regression) -> NamedFigure | None:
     """Returns a figure of the win differences of all metrics in points."""
-    bars = []
-    for item in regression.changes:
-        difference = item.comparison.difference
-        if difference is not None and difference.interval is not None:
-            ends = (difference.interval.low, difference.value, difference.interval.high)
-            bars.append((item, tuple(100.0 * end for end in ends)))
+    differences = [(item, item.comparison.difference) for item in regression.changes]
+    bars = [(item, difference) for item, difference in differences if difference and difference.interval]
     if not bars:
         return None
     figure = go.Figure(_markers(bars))
@@ -141,16 +139,14 @@ def _figure(regression: Regression) -> NamedFigure | None:
     return NamedFigure("changes", "Changes", summary, figure)
 
 
-def _markers(bars: Sequence[tuple[MetricChange, tuple[float, ...]]]) -> list[go.Scatter]:
+def _markers(bars: Sequence[tuple[MetricChange, Estimate]]) -> list[go.Scatter]:
     names = unique_labels([f"{item.method}, {spaced_words(item.metric.name)}" for item, _ in bars], 56)
+    colors = [COLOR_OF_CHANGE.get(item.change, MUTED) for item, _ in bars]
     return [
         go.Scatter(
-            x=[value], y=[name], mode="markers", marker={"color": COLOR_OF_CHANGE.get(item.change, MUTED), "size": 9},
-            error_x={
-                "type": "data", "symmetric": False, "array": [high - value], "arrayminus": [value - low],
-                "color": COLOR_OF_CHANGE.get(item.change, MUTED), "thickness": 1.6, "width": 5,
-            },
+            x=[100.0 * difference.value], y=[name], mode="markers", marker={"color": color, "size": 9},
+            error_x=whiskers([difference], 100.0, color, thickness=1.6, width=5),
             hovertemplate="%{y}: %{x:+.3g}<extra></extra>",
         )
-        for name, (item, (low, value, high)) in zip(names, bars, strict=True)
+        for name, color, (_, difference) in zip(names, colors, bars, strict=True)
     ]  # fmt: skip

@@ -206,7 +206,7 @@ def _robustness(results: ExperimentResults) -> Robustness | None:
 
 def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
     return _existing_figures(
-        ranking_figure(analysis.summaries, _main_metric(results)),
+        ranking_figure(analysis.summaries, main_metric(results.description)),
         differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS])
         if len(analysis.methods) <= MAX_PAIRED_METHODS
         else None,
@@ -214,8 +214,9 @@ def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[
     )
 
 
-def _main_metric(results: ExperimentResults) -> Metric | None:
-    return next((item for item in results.description.metrics if item.name != SUCCESS), None)
+def main_metric(description: ExperimentDescription) -> Metric | None:
+    """Returns the first metric of an experiment besides success."""
+    return next((item for item in description.metrics if item.name != SUCCESS), None)
 
 
 def _existing_figures(*figures: NamedFigure | None) -> list[NamedFigure]:

@@ -18,6 +18,7 @@ from modular_framework_benchmark.reports.figure_style import (
     dash_of,
     label_text,
     spaced_words,
+    whiskers,
 )
 from modular_framework_benchmark.reports.number_text import interval_text, percentage_text
 from modular_framework_benchmark.statistics.comparison import Estimate
@@ -84,10 +85,6 @@ def _points(
 ) -> go.Scatter:
     """Returns the estimates of a curve with their intervals."""
     estimates = [(point, estimate) for point in curve.points if (estimate := estimate_of(point)) is not None]
-    ends = [
-        (estimate.interval.low, estimate.interval.high) if estimate.interval else (estimate.value,) * 2
-        for _, estimate in estimates
-    ]
     return go.Scatter(
         x=[point.value + shift for point, _ in estimates], y=[100.0 * estimate.value for _, estimate in estimates],
         mode="markers",
@@ -95,15 +92,7 @@ def _points(
         customdata=[
             (point.value, point.success.counts.succeeded, point.success.counts.episodes) for point, _ in estimates
         ],
-        error_y={
-            "type": "data", "symmetric": False, "color": color_of(index), "thickness": 1.4, "width": 5,
-            "array": [
-                100.0 * (high - estimate.value) for (_, high), (_, estimate) in zip(ends, estimates, strict=True)
-            ],
-            "arrayminus": [
-                100.0 * (estimate.value - low) for (low, _), (_, estimate) in zip(ends, estimates, strict=True)
-            ],
-        },
+        error_y=whiskers([estimate for _, estimate in estimates], 100.0, color_of(index), thickness=1.4, width=5),
         hovertemplate=f"{label_text(curve.method)}, level %{{customdata[0]:.4g}}: %{{y:.1f}} % "
         "(%{customdata[1]} of %{customdata[2]} episodes succeeded)<extra></extra>",
     )  # fmt: skip

@@ -8,7 +8,7 @@ from modular_framework_benchmark.reports.figure_style import spaced_words
 from modular_framework_benchmark.reports.number_text import NO_VALUE, count_text, percentage_text
 from modular_framework_benchmark.reports.report_content import ReportContent
 from modular_framework_benchmark.reports.robustness_figures import fall_text, side_text, value_text
-from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text
+from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text, number_cells
 from modular_framework_benchmark.statistics.observations import SUCCESS
 from modular_framework_benchmark.statistics.robustness import CurvePoint, Robustness
 
@@ -26,15 +26,8 @@ def _falls_table(robustness: Robustness) -> Table:
         for curve in robustness.of_axis(name):
             sides = "; ".join(side_text(side, curve.axis, wanted_success) for side in curve.sides)
             at = value_text(curve.fall.value, curve.axis) if curve.fall else NO_VALUE
-            texts = (fall_text(curve) or NO_VALUE, at)
-            rows.append(
-                (
-                    Cell(spaced_words(name)),
-                    Cell(curve.method),
-                    *(Cell(text, is_number=True) for text in texts),
-                    Cell(sides),
-                )
-            )
+            numbers = number_cells(fall_text(curve) or NO_VALUE, at)
+            rows.append((Cell(spaced_words(name)), Cell(curve.method), *numbers, Cell(sides)))
     columns = (
         "axis",
         "method",
@@ -62,11 +55,13 @@ def _levels_table(robustness: Robustness) -> Table:
         (
             Cell(spaced_words(curve.axis.name)),
             Cell(curve.method),
-            Cell(_level_text(point, curve.axis), is_number=True),
-            Cell(estimate_text(point.success.estimate, SUCCESS), is_number=True),
-            Cell(estimate_text(point.progress.mean, SUCCESS) if point.progress else NO_VALUE, is_number=True),
-            Cell(count_text(point.success.counts.succeeded), is_number=True),
-            Cell(count_text(point.success.counts.counted), is_number=True),
+            *number_cells(
+                _level_text(point, curve.axis),
+                estimate_text(point.success.estimate, SUCCESS),
+                estimate_text(point.progress.mean, SUCCESS) if point.progress else NO_VALUE,
+                count_text(point.success.counts.succeeded),
+                count_text(point.success.counts.counted),
+            ),
         )
         for name in robustness.order
         for curve in robustness.of_axis(name)

@@ -21,6 +21,7 @@ from modular_framework_benchmark.reports.figure_style import (
     label_text,
     spaced_words,
     unique_labels,
+    whiskers,
 )
 from modular_framework_benchmark.reports.number_text import count_phrase, count_text, percentage_text
 from modular_framework_benchmark.reports.span_tables import SpanSummary
@@ -67,21 +68,10 @@ def _dots(names: Sequence[str], estimates: Sequence[Estimate | None], scale: flo
     known_parts = [
         (name, part) for name, part in zip(names, estimates, strict=True) if part and math.isfinite(part.value)
     ]
-    ends = [(part.interval.low, part.interval.high) if part.interval else (part.value,) * 2 for _, part in known_parts]
-    whiskers = [
-        tuple(end if math.isfinite(end) else part.value for end in pair)
-        for pair, (_, part) in zip(ends, known_parts, strict=True)
-    ]
     return go.Scatter(
         x=[scale * part.value for _, part in known_parts], y=[name for name, _ in known_parts], mode="markers",
         marker={"color": INK, "size": 9},
-        error_x={
-            "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 6,
-            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(whiskers, known_parts, strict=True)],
-            "arrayminus": [
-                scale * (part.value - low) for (low, _), (_, part) in zip(whiskers, known_parts, strict=True)
-            ],
-        },
+        error_x=whiskers([part for _, part in known_parts], scale, INK, thickness=1.6, width=6),
         hovertemplate="%{y}: %{x:.4g}<extra></extra>",
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ from modular_framework_benchmark.reports.number_text import (
     p_value_text,
     percentage_text,
 )
-from modular_framework_benchmark.reports.report_content import MAX_PAIRED_METHODS, SUCCESS, ReportContent
+from modular_framework_benchmark.reports.report_content import MAX_PAIRED_METHODS, SUCCESS, ReportContent, main_metric
 from modular_framework_benchmark.reports.robustness_figures import robustness_sentences
 from modular_framework_benchmark.reports.success_figures import level_words
 from modular_framework_benchmark.statistics.comparison import (
@@ -71,6 +71,11 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
+def number_cells(*texts: str) -> tuple[Cell, ...]:
+    """Returns a cell with a number for each text."""
+    return tuple(Cell(text, is_number=True) for text in texts)
+
+
 def table_text(table: Table) -> str:
     """Returns a table as plain text."""
     rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
@@ -82,7 +87,7 @@ def table_text(table: Table) -> str:
 
 def answer_text(content: ReportContent) -> str:
     """Returns the summary at the top of a report as plain text."""
-    main = _main_metric(content)
+    main = main_metric(content.description)
     needed = _needed_episodes(content, [main] if main else [])
     return "\n".join(
         [table_text(answer_table(content)), "", *answer_sentences(content), *needed, content.analysis.scope]
@@ -119,11 +124,6 @@ def _without_interval(content: ReportContent) -> str:
     return f"{without} of {count_phrase(len(estimates), 'figure')} (rates, medians and differences) have no interval."
 
 
-def _main_metric(content: ReportContent) -> Metric | None:
-    """Returns the first metric of the experiment besides success."""
-    return next((item for item in content.description.metrics if item.name != SUCCESS), None)
-
-
 def _needed_episodes(content: ReportContent, metrics: Sequence[Metric]) -> list[str]:
     """Returns a sentence for each mean that would have an interval with more episodes; none below MIN_UNITS units."""
     sentences = []
@@ -141,7 +141,7 @@ def _needed_episodes(content: ReportContent, metrics: Sequence[Metric]) -> list[
 
 def answer_table(content: ReportContent) -> Table:
     """Returns a row per method: episodes, success, the main metric, and the most frequent failure."""
-    main = _main_metric(content)
+    main = main_metric(content.description)
     summary_of = {(item.metric, item.method): item for item in content.analysis.summaries}
     success = next(metric for metric in content.metrics if metric.name == SUCCESS)
     rows = []
@@ -313,7 +313,7 @@ def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
     low, high = item.quartiles or (None, None)
     scale, unit = (100.0, "%") if metric.is_fraction else (1.0, metric.unit)
     ends = [number_text(None if end is None else scale * end, unit=unit) for end in (low, high)]
-    texts = (
+    figures = number_cells(
         estimate_text(item.estimate, metric),
         f"{ends[0]} to {ends[1]}" if item.quartiles else NO_VALUE,
         estimate_text(item.mean, metric),
@@ -322,7 +322,7 @@ def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
         count_text(item.counts.censored) if metric.limit is not None else NO_VALUE,
         count_text(item.counts.missing),
     )
-    return (Cell(metric_title(metric)), Cell(item.method), *(Cell(text, is_number=True) for text in texts))
+    return (Cell(metric_title(metric)), Cell(item.method), *figures)
 
 
 def comparison_table(content: ReportContent, component: str) -> Table:
@@ -364,7 +364,7 @@ def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
             result = Cell(f"could not be shown with {count_phrase(item.counts.units, item.unit_noun)}{needed}")
         case Verdict.NO_DATA:
             result = Cell("nothing to compare")
-    texts = (
+    figures = number_cells(
         count_text(item.counts.won),
         count_text(item.counts.lost),
         wins_text(item),
@@ -372,12 +372,7 @@ def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
         estimate_text(item.mean_difference, metric),
         pairs_text(item.counts),
     )
-    return (
-        Cell(metric_title(metric)),
-        Cell(f"{item.first}, {item.second}"),
-        *(Cell(text, is_number=True) for text in texts),
-        result,
-    )
+    return (Cell(metric_title(metric)), Cell(f"{item.first}, {item.second}"), *figures, result)
 
 
 def missing_table(content: ReportContent) -> Table:
@@ -388,17 +383,14 @@ def missing_table(content: ReportContent) -> Table:
             if item.metric != metric.name:
                 continue
             counts, limit = item.counts, metric.limit is not None
-            rows.append((
-                Cell(metric_title(metric)), Cell(item.method),
-                *(
-                    Cell(text, is_number=True)
-                    for text in (
-                        count_text(counts.episodes), count_text(counts.counted - counts.censored),
-                        count_text(counts.censored) if limit else NO_VALUE, count_text(counts.missing),
-                        percentage_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NO_VALUE,
-                    )
-                ),
-            ))  # fmt: skip
+            numbers = number_cells(
+                count_text(counts.episodes),
+                count_text(counts.counted - counts.censored),
+                count_text(counts.censored) if limit else NO_VALUE,
+                count_text(counts.missing),
+                percentage_text(counts.unmeasured_share),
+            )
+            rows.append((Cell(metric_title(metric)), Cell(item.method), *numbers))
     columns = ("metric", "method", "episodes", "with a value", "at the limit", "missing", "without a value")
     caption = "Missing and censored values: every excluded value is counted here."
     return Table("missing", caption, columns, tuple(rows))
@@ -406,21 +398,13 @@ def missing_table(content: ReportContent) -> Table:
 
 def status_table(content: ReportContent) -> Table:
     """Returns the numbers of each method's episodes by final status."""
-    items = [item for item in content.analysis.summaries if item.metric == SUCCESS]
-    rows = tuple(
-        (
-            Cell(item.method),
-            *(
-                Cell(count_text(count), is_number=True)
-                for count in (
-                    item.counts.episodes, item.counts.succeeded, item.counts.failed, item.counts.timed_out,
-                    item.counts.broken,
-                )
-            ),
-        )
-        for item in items
-    )  # fmt: skip
     columns = ("method", "episodes", "succeeded", "failed", "timed out", "broken")
+    names = [column.replace(" ", "_") for column in columns[1:]]
+    rows = tuple(
+        (Cell(item.method), *number_cells(*(count_text(getattr(item.counts, name)) for name in names)))
+        for item in content.analysis.summaries
+        if item.metric == SUCCESS
+    )
     return Table("statuses", "Final status of the finished episodes.", columns, rows)
 
 
@@ -431,9 +415,11 @@ def levels_table(content: ReportContent) -> Table:
         (
             Cell(level_words(item.levels)),
             Cell(item.method),
-            Cell(estimate_text(item.estimate, metric), is_number=True),
-            Cell(count_text(item.counts.succeeded), is_number=True),
-            Cell(count_text(item.counts.counted), is_number=True),
+            *number_cells(
+                estimate_text(item.estimate, metric),
+                count_text(item.counts.succeeded),
+                count_text(item.counts.counted),
+            ),
         )
         for item in content.levels
     )
@@ -452,17 +438,12 @@ def spans_table(content: ReportContent, kind: str) -> Table:
         (
             Cell(item.name),
             Cell(item.method),
-            *(
-                Cell(text, is_number=True)
-                for text in (
-                    count_text(item.runs), count_text(item.failed), count_text(item.unended),
-                    number_text(item.mean_s), number_text(item.per_episode_s),
-                )
-            ),
+            *number_cells(*map(count_text, (item.runs, item.failed, item.unended))),
+            *number_cells(*map(number_text, (item.mean_s, item.per_episode_s))),
         )
         for item in content.spans
         if item.kind == kind
-    )  # fmt: skip
+    )
     columns = (kind, "method", "runs", "failed", "never ended", "mean [s]", "mean per episode [s]")
     caption = f"Real time of each {kind}; the mean per episode counts concurrent work once."
     return Table(f"spans_{kind}", caption, columns, rows)
