@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 from geometry_msgs.msg import Twist as TwistMsg
-from moveit_msgs.msg import AttachedCollisionObject, CollisionObject
+from moveit_msgs.msg import CollisionObject
 from shape_msgs.msg import Mesh as MeshMsg
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
 from shape_msgs.msg import Plane as PlaneMsg
@@ -151,18 +151,3 @@ def mesh_to_msg(mesh: TriangleMesh) -> MeshMsg:
         [MeshTriangle([int(a), int(b), int(c)]) for a, b, c in mesh.triangles],
         [Point(float(x), float(y), float(z)) for x, y, z in mesh.vertices],
     )
-
-
-def attached_object(item: CollisionObject, link: str, touch_links: list[str]) -> AttachedCollisionObject:
-    """Returns an object that is attached to a robot link.
-
-    Args:
-        item: The object, with its pose in the link frame.
-        link: Name of the link.
-        touch_links: Links that may touch the object.
-    """
-    message = AttachedCollisionObject()
-    message.link_name = link
-    message.object = item
-    message.touch_links = touch_links
-    return message

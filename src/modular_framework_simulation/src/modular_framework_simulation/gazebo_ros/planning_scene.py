@@ -228,7 +228,7 @@ class PlanningScenePublisher:
                 world.append(CollisionObject(id=identity, operation=CollisionObject.REMOVE))
             case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose, touch_links=touch_links):
                 item = conversions.link_to_collision_object(model, spec, carrier, pose)
-                attached.append(conversions.attached_object(item, carrier, list(touch_links)))
+                attached.append(AttachedCollisionObject(link_name=carrier, object=item, touch_links=list(touch_links)))
             case Detach(carrier_link=carrier):
                 released = AttachedCollisionObject(link_name=carrier)
                 released.object.id = identity

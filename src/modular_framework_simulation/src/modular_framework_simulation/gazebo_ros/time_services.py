@@ -70,9 +70,21 @@ class TimeServices:
             (ros_names.REFEREE, Trigger, self._on_referee),
             (ros_names.RECORD_WORLD, SetBool, self._on_record),
         ):
-            self._services.append(rospy.Service(name, kind, response))
+            self._serve(name, kind, response)
         if self._digest is not None:
-            self._services.append(rospy.Service(ros_names.STATE_DIGEST, Trigger, self._on_digest))
+            self._serve(ros_names.STATE_DIGEST, Trigger, self._on_digest)
+
+    def _serve(self, name: str, kind: Any, respond: Callable[[Any], Any]) -> None:
+        """Advertises a service with `success` and `message`; a failure is logged, and its reason is the message."""
+
+        def handle(request: Any) -> Any:
+            try:
+                return respond(request)
+            except (HoldError, SimulationError) as error:
+                rospy.logerr("%s: %s", name, error)
+                return kind._response_class(success=False, message=str(error))
+
+        self._services.append(rospy.Service(name, kind, handle))
 
     def close(self) -> None:
         """Closes the services; may be called twice."""
@@ -92,38 +104,26 @@ class TimeServices:
                 holds.hold(request.owner, request.lease_s, request.during_motions)
             return stamp_of(self._loop.world)
 
-        try:
-            if not self._may_hold:
-                raise HoldError("simulated time cannot be held, because /wait_for_planning is false")
-            return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, hold_time))
-        except (HoldError, SimulationError) as error:
-            rospy.logerr("%s: %s", ros_names.HOLD_TIME, error)
-            return HoldTimeResponse(success=False, message=str(error))
+        if not self._may_hold:
+            raise HoldError("simulated time cannot be held, because /wait_for_planning is false")
+        return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, hold_time))
 
     def _on_advance(self, request: Any) -> AdvanceTimeResponse:
-        try:
-            duration_s = request.duration.to_sec()
-            if not 0.0 <= duration_s <= _MAX_ADVANCE_S:
-                raise HoldError(f"duration is {duration_s:g} s; allowed: 0 to {_MAX_ADVANCE_S:g} s")
-            if duration_s > 0.0:
-                self._advance(duration_s)
-            stamp, held = self._synchronized_now()
-            return AdvanceTimeResponse(success=True, stamp=stamp, held=held)
-        except (HoldError, SimulationError) as error:
-            rospy.logerr("%s: %s", ros_names.ADVANCE_TIME, error)
-            return AdvanceTimeResponse(success=False, message=str(error))
+        duration_s = request.duration.to_sec()
+        if not 0.0 <= duration_s <= _MAX_ADVANCE_S:
+            raise HoldError(f"duration is {duration_s:g} s; allowed: 0 to {_MAX_ADVANCE_S:g} s")
+        if duration_s > 0.0:
+            self._advance(duration_s)
+        stamp, held = self._synchronized_now()
+        return AdvanceTimeResponse(success=True, stamp=stamp, held=held)
 
     def _on_step(self, request: Any) -> AdvanceTimeResponse:
         """Advances paused time by a duration, rounded up to at least one physics step."""
-        try:
-            duration_s = request.duration.to_sec()
-            if not 0.0 <= duration_s <= _MAX_STEP_S:
-                raise HoldError(f"duration is {duration_s:g} s; allowed: 0 (one step) to {_MAX_STEP_S:g} s")
-            stamp = self._in_loop(ros_names.STEP_TIME, lambda: self._step(duration_s))
-            return AdvanceTimeResponse(success=True, stamp=stamp, held=True)
-        except (HoldError, SimulationError) as error:
-            rospy.logerr("%s: %s", ros_names.STEP_TIME, error)
-            return AdvanceTimeResponse(success=False, message=str(error))
+        duration_s = request.duration.to_sec()
+        if not 0.0 <= duration_s <= _MAX_STEP_S:
+            raise HoldError(f"duration is {duration_s:g} s; allowed: 0 (one step) to {_MAX_STEP_S:g} s")
+        stamp = self._in_loop(ros_names.STEP_TIME, lambda: self._step(duration_s))
+        return AdvanceTimeResponse(success=True, stamp=stamp, held=True)
 
     def _step(self, duration_s: float) -> rospy.Time:
         if not self._loop.paused:
@@ -160,13 +160,9 @@ class TimeServices:
         return stamp_of(self._loop.world), held, self._take_snapshot() if outdated else None
 
     def _on_restart(self, request: Any) -> TriggerResponse:
-        try:
-            self._in_loop(ros_names.RESTART, self._loop.restart)
-            self._loop.referee.note(ros_names.RESTART, caller_of(request))
-            self._after_restart()
-        except SimulationError as error:
-            rospy.logerr("%s: %s", ros_names.RESTART, error)
-            return TriggerResponse(success=False, message=str(error))
+        self._in_loop(ros_names.RESTART, self._loop.restart)
+        self._loop.referee.note(ros_names.RESTART, caller_of(request))
+        self._after_restart()
         return TriggerResponse(success=True, message="the world is in its initial state")
 
     def _on_referee(self, _request: Any) -> TriggerResponse:
@@ -185,10 +181,7 @@ class TimeServices:
                 "interventions": [asdict(each) for each in self._loop.referee.interventions],
             }
 
-        try:
-            return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, read)))
-        except SimulationError as error:
-            return TriggerResponse(success=False, message=str(error))
+        return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, read)))
 
     def _on_record(self, request: Any) -> SetBoolResponse:
         """Starts a record of the world (`data` true), or ends the record and returns it as JSON.
@@ -196,14 +189,11 @@ class TimeServices:
         The referee notes each call, so that only the node that placed the objects can start or end the record unseen.
         """
         record = self._loop.record
-        try:
-            self._loop.referee.note(ros_names.RECORD_WORLD, caller_of(request))
-            if request.data:
-                self._in_loop(ros_names.RECORD_WORLD, record.start)
-                return SetBoolResponse(success=True, message="the record of the world has started")
-            return SetBoolResponse(success=True, message=json.dumps(self._in_loop(ros_names.RECORD_WORLD, record.stop)))
-        except SimulationError as error:
-            return SetBoolResponse(success=False, message=str(error))
+        self._loop.referee.note(ros_names.RECORD_WORLD, caller_of(request))
+        if request.data:
+            self._in_loop(ros_names.RECORD_WORLD, record.start)
+            return SetBoolResponse(success=True, message="the record of the world has started")
+        return SetBoolResponse(success=True, message=json.dumps(self._in_loop(ros_names.RECORD_WORLD, record.stop)))
 
     def _on_digest(self, _request: Any) -> TriggerResponse:
         digest = self._digest
