@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -62,18 +62,7 @@ class ScenePoses:
 
 def models_to_text(models: Sequence[VisibleModel]) -> str:
     """Serializes the visual shapes of models as JSON for `models_from_text`."""
-    records = [
-        {
-            "number": model.number,
-            "name": model.name,
-            "links": [
-                {"name": link.name, "visuals": [_visual_record(visual) for visual in link.visuals]}
-                for link in model.links
-            ],
-        }
-        for model in models
-    ]
-    return orjson.dumps(records).decode()
+    return _json_text(models)
 
 
 def models_from_text(text: str) -> tuple[VisibleModel, ...]:
@@ -100,12 +89,7 @@ def models_from_text(text: str) -> tuple[VisibleModel, ...]:
 
 def poses_to_text(poses: ScenePoses) -> str:
     """Serializes link poses as JSON for `poses_from_text`, each pose as x, y, z [m] and a quaternion xyzw."""
-    record = {
-        "time_ns": poses.time_ns,
-        "paused": poses.paused,
-        "poses": {str(number): [_pose_record(pose) for pose in links] for number, links in poses.poses.items()},
-    }
-    return orjson.dumps(record).decode()
+    return _json_text(poses)
 
 
 def poses_from_text(text: str) -> ScenePoses:
@@ -122,8 +106,19 @@ def poses_from_text(text: str) -> ScenePoses:
         raise ValueError(f"not the poses of visible models ({type(error).__name__}: {error})") from None
 
 
-def _pose_record(pose: Pose) -> tuple[float, ...]:
-    return (*pose.position, *pose.quaternion)
+def _json_text(value: Any) -> str:
+    return orjson.dumps(value, _json_value, orjson.OPT_PASSTHROUGH_DATACLASS | orjson.OPT_NON_STR_KEYS).decode()
+
+
+def _json_value(value: Any) -> Any:
+    """Returns a path as text, a pose as x, y, z, and a quaternion xyzw, and another dataclass as a mapping."""
+    match value:
+        case Path():
+            return str(value)
+        case Pose():
+            return (*value.position, *value.quaternion)
+    record = {field.name: getattr(value, field.name) for field in fields(value)}
+    return {"shape": type(value).__name__.lower(), **record} if isinstance(value, specs.Geometry) else record
 
 
 def _pose_from(numbers: Sequence[float]) -> Pose:
@@ -138,17 +133,6 @@ def _numbers(values: Sequence[float]) -> tuple[float, ...]:
     return numbers
 
 
-def _visual_record(visual: specs.Visual) -> dict[str, Any]:
-    return {
-        "name": visual.name,
-        "pose": _pose_record(visual.pose),
-        "geometry": _geometry_record(visual.geometry),
-        "colour": visual.colour,
-        "texture": str(visual.texture) if visual.texture is not None else None,
-        "own_materials": visual.own_materials,
-    }
-
-
 def _visual_from(record: Mapping[str, Any]) -> specs.Visual:
     red, green, blue, alpha = _numbers(record["colour"])
     texture = record["texture"]
@@ -160,21 +144,6 @@ def _visual_from(record: Mapping[str, Any]) -> specs.Visual:
         Path(texture) if texture is not None else None,
         bool(record["own_materials"]),
     )
-
-
-def _geometry_record(geometry: specs.Geometry) -> dict[str, Any]:
-    match geometry:
-        case specs.Box(size=size):
-            return {"shape": "box", "size": size}
-        case specs.Cylinder(radius=radius, length=length):
-            return {"shape": "cylinder", "radius": radius, "length": length}
-        case specs.Sphere(radius=radius):
-            return {"shape": "sphere", "radius": radius}
-        case specs.Plane(normal=normal, size=size):
-            return {"shape": "plane", "normal": normal, "size": size}
-        case specs.Mesh(path=path, scale=scale, submesh=submesh, center=center):
-            return {"shape": "mesh", "path": str(path), "scale": scale, "submesh": submesh, "center": center}
-    raise TypeError(f"{type(geometry).__name__} is not a geometry")
 
 
 def _geometry_from(record: Mapping[str, Any]) -> specs.Geometry:
