@@ -105,12 +105,10 @@ def _filled_shapes(link: urdf.Link, find_package: PackageFinder) -> specs.Inerti
 
 def _geometry(link: str, shape: urdf.Shape, find_package: PackageFinder) -> specs.Geometry | None:
     match shape:
-        case urdf.Box(size=size):
-            return specs.Box(size)
-        case urdf.Cylinder(radius=radius, length=length) | urdf.Capsule(radius=radius, length=length):
+        case specs.Box() | specs.Cylinder() | specs.Sphere():
+            return shape
+        case urdf.Capsule(radius=radius, length=length):
             return specs.Cylinder(radius, length)
-        case urdf.Sphere(radius=radius):
-            return specs.Sphere(radius)
         case urdf.MeshFile(uri=uri, scale=scale):
             try:
                 return specs.Mesh(mesh_path(uri, find_package), scale)
