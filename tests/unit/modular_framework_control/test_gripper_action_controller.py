@@ -98,6 +98,20 @@ def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: 
     assert handle(loop).command == 0.8
 
 
+@pytest.mark.parametrize(("value", "status"), [(True, GoalStatus.SUCCEEDED), (False, GoalStatus.ABORTED)])
+def test_a_stalled_goal_succeeds_where_stalling_is_allowed(
+    make_loop: Callable[..., Any], value: bool, status: GoalStatus
+) -> None:
+    loop = make_loop(parameters(allow_stalling=value, goal_tolerance=0.02), FingerAtAnObject())
+    loop.spawn("gripper")
+    goal_handle = send(loop, 0.8)
+    loop.run(1.0)
+    assert goal_handle.status is status
+    assert goal_handle.result is not None and goal_handle.result.stalled and not goal_handle.result.reached_goal
+    loop.manager.update(loop.time_s, 0.01)
+    assert handle(loop).command == 0.8  # the fingers keep their grip
+
+
 def test_a_gripper_leaves_an_object_at_once_however_far_beyond_the_object_its_command_was(loop: Any) -> None:
     send(loop, 0.95)
     loop.run(2.0)

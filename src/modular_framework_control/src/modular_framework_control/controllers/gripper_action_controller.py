@@ -2,7 +2,8 @@
 """Gripper controller for one joint, with bounded effort and stall detection.
 
 A grasp ends in a stall: the fingers stop short of the goal because they hold an object. As in ros_controllers, the goal
-is then aborted with `stalled` set, and the command stays active, so that the fingers keep their grip.
+is then aborted with `stalled` set. With `allow_stalling`, a parameter of ros2_controllers, the goal succeeds instead.
+In both cases, the command stays active, so that the fingers keep their grip.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeG
 from modular_framework_control.realtime.mailbox import Mailbox
 from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_control.trajectory.point_checks import MAX_VALUE
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_names, read_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,8 @@ class GripperActionController(Controller):
 
     Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, the default
     for goals, where 0 means the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
-    1.0; `action_monitor_rate` [1/s] 20; `state_publish_rate` [1/s] 50.
+    1.0; `allow_stalling` false, whether a stalled goal succeeds; `action_monitor_rate` [1/s] 20; `state_publish_rate`
+    [1/s] 50.
 
     Attributes:
         on_state: Function called in the control loop at `state_publish_rate` with a snapshot, whose gains are 0.
@@ -102,6 +104,7 @@ class GripperActionController(Controller):
         self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
         self._default_max_effort = abs(read_number(controller_nh, "max_effort", 0.0, None))
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
+        self._allow_stalling = read_bool(controller_nh, "allow_stalling", False)
         threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
         self._stall_distance = threshold * self._stall_timeout_s
         self._state_schedule = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
@@ -264,7 +267,7 @@ class GripperActionController(Controller):
             self._rest_since_s = time_s
         elif time_s - self._rest_since_s > self._stall_timeout_s:
             self._finish(
-                GoalStatus.ABORTED,
+                GoalStatus.SUCCEEDED if self._allow_stalling else GoalStatus.ABORTED,
                 self._state(True, False),
                 f"stalled: joint '{self._handle.name}' is at rest at {position:.6g}, {error:+.6g} short of its "
                 f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s",
