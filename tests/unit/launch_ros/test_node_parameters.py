@@ -80,6 +80,25 @@ def test_a_file_of_ros_2_gives_each_node_its_sections(context: LaunchContext, tm
     assert planned(LaunchContext(), left) == {"/left/node/wild": 2, "/left/node/both": "wild", "/left/node/left": 4}
 
 
+@pytest.mark.parametrize(
+    ("pattern", "nodes"),
+    [
+        ("/**/node", "/node /left/node /left/arm/node"),
+        ("/*/node", "/left/node"),
+        ("/**", "/node /left/node /left/arm/node /other"),
+        ("/left/**", "/left/node /left/arm/node"),
+        ("node", "/node"),
+    ],
+)
+def test_two_stars_stand_for_any_number_of_namespaces(tmp_path: Path, pattern: str, nodes: str) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"{pattern}: {{ros__parameters: {{found: true}}}}\n")
+    context = LaunchContext()
+    for namespace, name in (("", "node"), ("left", "node"), ("left/arm", "node"), ("", "other")):
+        Node(**PROGRAM, name=name, namespace=namespace, parameters=[str(file)]).visit(context)
+    assert set(context.parameters.values()) == {f"{node}/found" for node in nodes.split()}
+
+
 def test_any_other_file_belongs_to_the_node(context: LaunchContext, tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text("arm:\n  joints: [a, b]\n")
     assert own(context, [TextSubstitution(text=str(tmp_path)), "/p.yaml"]) == {"arm/joints": ["a", "b"]}

@@ -2,6 +2,7 @@
 """Programs, controller files and hardware tags of ROS 2 become those of ROS 1."""
 
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 from launch import LaunchContext
@@ -20,6 +21,18 @@ arm:
   ros__parameters: {{joints: [a, b], command_interfaces: [position], constraints: {{goal_time: 0.5}}}}
 base:
   ros__parameters: {{joints: [c], command_interfaces: [velocity, position]}}
+"""
+FR3_CONTROLLERS = """
+{0}controller_manager:
+  ros__parameters:
+    update_rate: 1000
+    fr3_arm_controller: {{type: joint_trajectory_controller/JointTrajectoryController}}
+{0}fr3_arm_controller:
+  ros__parameters:
+    command_interfaces: [effort]
+    state_interfaces: [position, velocity]
+    joints: [fr3_joint1]
+    gains: {{fr3_joint1: {{p: 600., d: 30., i: 0., i_clamp: 1.}}}}
 """
 MOCK = "mock_components/GenericSystem"
 SIMULATED = "gz_ros2_control/GazeboSimSystem"
@@ -148,6 +161,21 @@ arm:
     assert values.get("/arm/constraints/stopped_velocity_tolerance", 0.02) == 0.02
     assert values.get("/arm/constraints/a/goal", 0.03) == 0.03
     assert (values["/arm/gains/a/p"], values["/arm/gains/a/d"], values["/arm/velocity_ff/a"]) == (10.0, 1.0, 0.5)
+
+
+@pytest.mark.parametrize("namespace", ["", "/left"])
+@pytest.mark.parametrize(
+    "file", [FR3_CONTROLLERS.format("/**/"), "/**:" + indent(FR3_CONTROLLERS.format(""), "  ")], ids=["flat", "nested"]
+)
+def test_sections_of_any_namespace_are_those_of_the_controllers(tmp_path: Path, file: str, namespace: str) -> None:
+    (tmp_path / "controllers.yaml").write_text(file)
+    options = {"namespace": namespace, "parameters": [str(tmp_path / "controllers.yaml")]}
+    values = visited(Node(package="controller_manager", executable="ros2_control_node", **options)).parameters.values()
+    assert values[f"{namespace}/controller_manager/rate"] == 1000.0
+    arm = f"{namespace}/fr3_arm_controller"
+    assert values[f"{arm}/type"] == "effort_controllers/JointTrajectoryController"
+    assert values[f"{arm}/joints"] == ["fr3_joint1"]
+    assert values[f"{arm}/gains/fr3_joint1/p"] == 600.0
 
 
 def test_an_interpolation_that_ros_1_lacks_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

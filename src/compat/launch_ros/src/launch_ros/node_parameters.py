@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import fnmatch
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,8 @@ SECTION = "ros__parameters"
 DESCRIPTION = "robot_description"
 DESCRIPTION_PARTS = ("", "_semantic", "_kinematics", "_planning")
 """Suffixes of the parameters that RViz, robot_state_publisher and MoveIt's clients read in their namespace."""
+WILDCARDS = {"*": r"/[^/]+", "**": r"(/[^/]+)*"}
+"""Expressions of the wildcards in patterns of node names: one part of a name, and any number of parts, also none."""
 CLOCK = "use_sim_time"
 """Parameter of the clock in the root namespace, which is shared by all nodes of a ROS 1 master."""
 
@@ -108,7 +110,8 @@ def parameters_of_node(sources: Iterable[ParameterSource], node: str) -> dict[st
 
 
 def _matches(pattern: str, node: str) -> bool:
-    return fnmatch.fnmatchcase(node, pattern.replace("/**", "/*")) or pattern in ("/**", node)
+    parts = pattern.strip("/").split("/")
+    return re.fullmatch("".join(WILDCARDS.get(part, f"/{re.escape(part)}") for part in parts), node) is not None
 
 
 def nest_dots(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from launch.core.screen_log import get_logger
 
 from launch_ros.namespaces import full_name, join
 from launch_ros.node_parameters import (
+    WILDCARDS,
     ParameterSource,
     merge,
     nest_dots,
@@ -147,12 +148,13 @@ def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[
             found |= {name: nest_dots(value) for name, value in named.items()}
             types |= {name: str(value["type"]) for name, value in named.items()}
             continue
-        for pattern, values in sections(source.content):
+        for pattern, values in sorted(sections(source.content), key=lambda each: "*" not in each[0]):
             inner = nest_dots(values)
+            name = pattern.rpartition("/")[2]
             own = {key: value for key, value in inner.items() if _is_controller(value)}
             types |= {name: str(value["type"]) for name, value in own.items()}
-            if not own and "*" not in pattern:
-                merge(found.setdefault(pattern.rpartition("/")[2], {}), inner)
+            if not own and name not in WILDCARDS:
+                merge(found.setdefault(name, {}), inner)
     for name, parameters in found.items():
         if name in types and parameters.get("interpolation_method", "splines") != "splines":
             get_logger().warning(
