@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-.PHONY: help build lint unit rostest system test full bench requirements
+.PHONY: help build lint unit rostest system test full bench site requirements
 help:            ## list what can be made
 	@grep -E '^[a-z]+: *##' $(MAKEFILE_LIST) | sed 's/: *##/\t/' | expand -t 16
 build:           ## set up and build
@@ -18,6 +18,9 @@ full:            ## run all tests
 	./install.sh test full
 bench:           ## run every benchmark, quickly
 	@for benchmark in benchmarks/*; do [ -x $$benchmark ] && ./install.sh exec $$benchmark --quick || exit 1; done
-requirements:    ## compile requirements.txt from requirements.in
+site:            ## build the documentation as a web site
+	./install.sh site
+requirements:    ## compile requirements.txt and requirements-site.txt
 	.venv/bin/pip install --quiet pip-tools
 	.venv/bin/pip-compile --quiet --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --no-header -o requirements.txt requirements.in
+	.venv/bin/pip-compile --quiet --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --no-header -o requirements-site.txt requirements-site.in

@@ -7,6 +7,7 @@ ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 VENV="$ROOT/.venv"
 LOG="$ROOT/logs/install.log"
 STAMPS="$ROOT/.venv/.stamps"
+SITE_BUILDER="$ROOT/.venv/site_builder"
 PROGRESS_PERIOD_S=${PROGRESS_PERIOD_S:-30}
 
 usage() {
@@ -20,6 +21,7 @@ usage: ./install.sh [COMMAND]
                        lint, unit, rostest, system or one suite
   shell                set up, then open a shell with everything sourced
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
+  site                 set up, then build the documentation as a web site, which any browser opens from the disk
   packages             only install the Debian packages and the Python environment
   help                 show this text
 
@@ -210,6 +212,20 @@ make_python_environment() {
   touch "$STAMPS/$digest"
 }
 
+# What only the documentation site needs. It has a folder of its own, so that the environment stays what requirements.txt says.
+install_site_builder() {
+  local digest
+  digest=$(sha256sum "$ROOT/requirements-site.txt" | cut -d' ' -f1)
+  if [ -f "$SITE_BUILDER/.$digest" ]; then
+    say "      Builder of the site: up to date"
+    return
+  fi
+  rm -rf "$SITE_BUILDER"
+  step "      Builder of the site: installing requirements-site.txt" "check the network; then run this script again" \
+    "$VENV/bin/pip" install --disable-pip-version-check --progress-bar off --target "$SITE_BUILDER" -r "$ROOT/requirements-site.txt"
+  touch "$SITE_BUILDER/.$digest"
+}
+
 # Where an underlay has message and tool packages of its own, ours are left out of the build.
 leave_out_packages_of_underlay() {
   local folder name ignore
@@ -369,6 +385,13 @@ main() {
       source_workspace
       exec "$@"
       ;;
+    site)
+      set_up
+      install_site_builder
+      source_workspace
+      export PYTHONPATH="$SITE_BUILDER:${PYTHONPATH:-}"
+      exec "$VENV/bin/python3" "$ROOT/docs/site/build_site.py" "$@"
+      ;;
     shell)
       set_up
       source_workspace
@@ -378,7 +401,7 @@ main() {
     help | -h | --help) usage ;;
     *)
       usage >&2
-      fail "unknown command '$command'" "use one of: run, experiment, test, shell, exec, packages, help"
+      fail "unknown command '$command'" "use one of: run, experiment, test, shell, exec, site, packages, help"
       ;;
   esac
 }

@@ -33,9 +33,9 @@ CLOCK_TIMEOUT_S, CLOCK_JUMP_S = 1.0, 1.0
 class SimulatedTime:
     """A thread-safe client for the simulation's time.
 
-    Parameters: ``/wait_for_planning`` (bool, false), read at the first use.
-    Services called: ``/gazebo/hold_time`` (simulation_time_msgs/HoldTime), ``/gazebo/advance_time``
-        (simulation_time_msgs/AdvanceTime).
+    - Parameter: ``/wait_for_planning`` (bool, false), read at the first use.
+    - Services called: ``/gazebo/hold_time`` (simulation_time_msgs/HoldTime), ``/gazebo/advance_time``
+      (simulation_time_msgs/AdvanceTime).
     """
 
     def __init__(self) -> None:

@@ -42,8 +42,8 @@ def motion_duration(times_s: npt.ArrayLike) -> float:
 def smoothness(times_s: npt.ArrayLike, positions: npt.ArrayLike) -> float | None:
     """Returns the log dimensionless jerk of a motion in joint space; nearer to zero is smoother.
 
-    The formula is -ln(T^3 / v^2 * integral of |jerk|^2 dt), with the duration T and the maximum speed v, from "On the
-    analysis of movement smoothness" (Balasubramanian and others, 2015). It is invariant to the amplitude and the
+    The formula is -ln(T^3 / v^2 * integral of norm(jerk)^2 dt), with the duration T and the maximum speed v, from "On
+    the analysis of movement smoothness" (Balasubramanian and others, 2015). It is invariant to the amplitude and the
     duration of the motion. A cubic spline interpolates the points, so that the jerk is constant between points.
 
     Args:

@@ -76,19 +76,18 @@ class GraspGenerator:
     New grasps replace the previous grasps. An object that the robot sets down counts as the object of the same name
     that was attached before.
 
-    Parameters: see :mod:`ros_generator_settings` and the parameters of the method. They are read for every generation,
-        and every 2 s while the scene is watched.
-    Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
-        ``component_reports`` (std_msgs/String, JSON: duration and number of grasps of a generation).
-    Services (std_srvs/Trigger):
-        ``generate_grasps``, ``~generate``: generates grasps.
-        ``refresh_grasps``, ``~refresh``: waits until the objects are at rest, then generates grasps if an object has
-            moved or no grasp of the last generation remains.
-        ``grasp_generated/renew``: like ``refresh_grasps``, and also generates grasps if a grasp has been taken. Waits
-            for an object for at most ``~scene_timeout``. A task calls this service before it reads the signal, because
-            the signal can be from the previous task.
-    Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``, ``list_grasps``,
-        ``clear_anonymous_grasps``.
+    - Parameters: see ``ros_generator_settings`` and the parameters of the method. They are read for every generation,
+      and every 2 s while the scene is watched.
+    - Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
+      ``component_reports`` (std_msgs/String, JSON: duration and number of grasps of a generation).
+    - Services ``generate_grasps`` and ``~generate`` (std_srvs/Trigger): generate grasps.
+    - Services ``refresh_grasps`` and ``~refresh`` (std_srvs/Trigger): wait until the objects are at rest, then generate
+      grasps if an object has moved or no grasp of the last generation remains.
+    - Service ``grasp_generated/renew`` (std_srvs/Trigger): like ``refresh_grasps``, and also generates grasps if a
+      grasp has been taken. Waits for an object for at most ``~scene_timeout``. A task calls this service before it
+      reads the signal, because the signal can be from the previous task.
+    - Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``, ``list_grasps``,
+      ``clear_anonymous_grasps``.
 
     Args:
         method: Grasp method.
