@@ -21,7 +21,7 @@ source_suffix = {".md": "markdown"}
 default_role = "code"
 suppress_warnings = ["ref.python"]  # packages may have errors of the same name
 highlight_language = "none"
-smartquotes = False  # a quotation mark in a docstring is part of a value
+smartquotes_action = "D"  # dashes only: a quotation mark in a docstring is part of a value
 
 myst_heading_anchors = 4  # the anchors of headings are those of GitHub
 
