@@ -11,6 +11,7 @@ import pytest
 import rospy
 from sensor_msgs.msg import PointCloud2, PointField
 
+from modular_framework_core.grasp_generation import ros_fresh_messages
 from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
 from point_cloud_grasps import ros_cloud_source
 from point_cloud_grasps.ros_cloud_source import CloudSource
@@ -73,11 +74,11 @@ class CameraFake:
 def source(monkeypatch: pytest.MonkeyPatch) -> CloudSource:
     """A source whose camera, transforms and time are fakes."""
     monkeypatch.setattr(ros_cloud_source, "Transforms", TransformsFake)
-    monkeypatch.setattr(ros_cloud_source, "SimulatedTime", TimeFake)
+    monkeypatch.setattr(ros_fresh_messages, "SimulatedTime", TimeFake)
     monkeypatch.setattr(rospy, "Subscriber", CameraFake)
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time.from_sec(NOW_S))
-    monkeypatch.setattr(ros_cloud_source, "MAX_REAL_WAIT_S", 5.0)
+    monkeypatch.setattr(ros_fresh_messages, "MAX_REAL_WAIT_S", 5.0)
     return CloudSource()
 
 

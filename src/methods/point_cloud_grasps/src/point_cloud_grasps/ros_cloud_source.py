@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,20 +12,15 @@ import rospy
 from sensor_msgs.msg import PointCloud2
 
 from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
-from modular_framework_core.grasp_generation.wait_limit import WaitLimit
-from modular_framework_ros.calls import wait_until
+from modular_framework_core.grasp_generation.ros_fresh_messages import FreshMessages, NoMessageError
+from modular_framework_core.grasp_generation.ros_transforms import Transforms
 from modular_framework_ros.point_clouds import PointCloudError, point_array
-from modular_framework_ros.simulated_time import SimulatedTime
-from point_cloud_grasps.ros_transforms import Transforms
 
 Array = npt.NDArray[np.float64]
 
 TRANSFORM_TIMEOUT_S = 5.0
 """Maximum wait for the transforms at a cloud's time [s of real time]; only a failure takes as long."""
-MAX_REAL_WAIT_S = 300.0
-"""Maximum wait for a cloud [s of real time], for a paused world or time held during rendering."""
 WARNING_PERIOD_S = 30.0
-BUFFER_BYTES = 1 << 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +39,7 @@ class SeenCloud:
 
 
 class CloudSource:
-    """Receives point clouds; subscribes to the camera only while waiting, since a camera renders only for subscribers.
+    """Receives point clouds; subscribes to the camera only while waiting.
 
     Subscribers: topic of the cloud (sensor_msgs/PointCloud2); permanently, the topics of :class:`Transforms`.
     """
@@ -53,7 +47,7 @@ class CloudSource:
     def __init__(self) -> None:
         """Creates the source without any subscription, see :meth:`connect`."""
         self._transforms = Transforms()
-        self._time = SimulatedTime()
+        self._messages = FreshMessages()
 
     def connect(self) -> None:
         """Subscribes to TF."""
@@ -113,38 +107,14 @@ class CloudSource:
         return self._transforms.stamps(frame, sources, stamp, TRANSFORM_TIMEOUT_S)
 
     def _message(self, topic: str, timeout_s: float) -> PointCloud2:
-        """Returns the first message that shows the world at the current time or later.
-
-        If time is held, only a message with that exact stamp counts; a later stamp comes from before a world reset.
-        """
-        held, messages = self._time.now(), list[PointCloud2]()
-        start_time = held or rospy.Time.now()
-
-        def keep(message: PointCloud2) -> None:
-            stamp = message.header.stamp
-            if stamp.is_zero() or stamp == start_time or (held is None and stamp > start_time):
-                messages.append(message)
-
-        subscriber = rospy.Subscriber(topic, PointCloud2, keep, queue_size=1, buff_size=BUFFER_BYTES)
-        limit, since_s = WaitLimit(), time.monotonic()
-
-        def is_over() -> bool:
-            real_s = MAX_REAL_WAIT_S if subscriber.get_num_connections() else timeout_s
-            return limit.is_exceeded(rospy.get_time(), timeout_s) or time.monotonic() - since_s > real_s
-
         try:
-            wait_until(lambda: bool(messages) or is_over(), MAX_REAL_WAIT_S)
-            if not messages:
-                published = subscriber.get_num_connections()
-                raise NoCandidatesError(
-                    f"no point cloud arrived on topic '{subscriber.resolved_name}' within {timeout_s:g} s, "
-                    + (
-                        f"from {published} publisher(s); is the camera running, and does it use the ROS clock?"
-                        if published
-                        else "nobody publishes it; start the camera, or set pointcloud_topic_name in "
-                        "sensors_config.yaml"
-                    )
+            return self._messages.take({topic: PointCloud2}, timeout_s)[topic]
+        except NoMessageError as error:
+            raise NoCandidatesError(
+                f"no point cloud arrived on topic '{error.topic}' within {timeout_s:g} s, "
+                + (
+                    f"from {error.publishers} publisher(s); is the camera running, and does it use the ROS clock?"
+                    if error.publishers
+                    else "nobody publishes it; start the camera, or set pointcloud_topic_name in sensors_config.yaml"
                 )
-        finally:
-            subscriber.unregister()
-        return messages[0]
+            ) from error
