@@ -15,7 +15,7 @@ from modular_framework_benchmark.metrics.measurements import ComponentReport, Ep
 from modular_framework_benchmark.predicates.conditions import NoContact, Untouched
 from modular_framework_benchmark.predicates.world_track import WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, REACHABLE, Figure
+from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, REACHABLE, Figure, MethodFault
 
 FAILED = EpisodeMeasurements(TaskSettings(), EpisodeStatus.FAILED, target="cube")
 
@@ -60,6 +60,15 @@ def test_how_an_episode_ended_comes_first(status: EpisodeStatus, expected: Failu
         (report("generation", 2.0, figures={CANDIDATES: 0.0, REACHABLE: 0.0}), FailureClass.NO_CANDIDATE),
         (report("generation", 2.0, succeeded=False), FailureClass.NO_CANDIDATE),
         (report("generation", 2.0, figures={CANDIDATES: 24.0, REACHABLE: 0.0}), FailureClass.UNREACHABLE),
+        (
+            report("generation", 2.0, succeeded=False, figures={METHOD_FAULT: MethodFault.NOT_STARTED}),
+            FailureClass.DIED,
+        ),
+        (report("generation", 2.0, succeeded=False, figures={METHOD_FAULT: MethodFault.DIED}), FailureClass.DIED),
+        (report("generation", 2.0, succeeded=False, figures={METHOD_FAULT: MethodFault.LATE}), FailureClass.DIED),
+        (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.RAISED}), FailureClass.INVALID_OUTPUT),
+        (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.INVALID_RESULT}), FailureClass.INVALID_OUTPUT),
+        (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.TOO_LARGE}), FailureClass.INVALID_OUTPUT),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -31.0}), FailureClass.UNREACHABLE),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -1.0}), FailureClass.NO_PLAN),
         (report("execution", 2.0, succeeded=False), FailureClass.MOTION),

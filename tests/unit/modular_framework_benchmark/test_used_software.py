@@ -70,6 +70,14 @@ def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Pat
     assert snapshot["digests"]["task"] == hashlib.sha256(b"name: pick").hexdigest()
 
 
+def test_the_digests_cover_the_files_in_the_command_of_an_external_method(tmp_path: Path) -> None:
+    method = tmp_path / "method.py"
+    method.write_text("serve()")
+    parameters = {"external": {"command": ["python3", str(method), "--fast", str(tmp_path)]}, "other": {"command": 3}}
+    digests = running_stack(parameters, {}, ["/external", "/other"], []).digests
+    assert digests == {f"method file {tmp_path.name}/method.py": hashlib.sha256(b"serve()").hexdigest()}
+
+
 MESH = "<visual name='v'><geometry><mesh{}</mesh></geometry></visual>"
 
 

@@ -8,7 +8,7 @@ and clock.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 
 
 class Clock(Enum):
@@ -47,10 +47,29 @@ class Figure:
     source: Source = Source.SAID
 
 
+class MethodFault(IntEnum):
+    """Fault of an external method, the value of the figure `METHOD_FAULT`."""
+
+    NOT_STARTED = 1
+    DIED = 2
+    LATE = 3
+    RAISED = 4
+    INVALID_RESULT = 5
+    TOO_LARGE = 6
+
+
 CANDIDATES = Figure("candidates", "generation", "", "Grasps found before their reachability was checked.")
 CHECKED = Figure("checked", "generation", "", "Grasps whose reachability was checked.")
 REACHABLE = Figure("reachable", "generation", "", "Grasps that the arm can reach without a collision.")
 BEST_RANK = Figure("best_rank", "generation", "", "Rank of the first reachable grasp in the method's order, from 1.")
+METHOD_TIME = Figure("method_time_s", "generation", "s", "Time of an external method in its process.", Clock.WALL)
+QUEUE_TIME = Figure("queue_time_s", "generation", "s", "Wait of requests to an external method.", Clock.WALL)
+TRANSPORT_TIME = Figure(
+    "transport_time_s", "generation", "s", "Time to exchange messages with an external method.", Clock.WALL
+)
+METHOD_FAULT = Figure(
+    "method_fault", "generation", "", "Fault of an external method, a value of `MethodFault`.", source=Source.MEASURED
+)
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
 PROCESSOR_TIME = Figure("processor_s", "planning", "s", "Processor time of the plan.", Clock.PROCESSOR, Source.MEASURED)
 CONCURRENT = Figure(

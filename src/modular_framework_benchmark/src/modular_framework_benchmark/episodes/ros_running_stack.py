@@ -59,13 +59,14 @@ def running_stack(
         plans: Planning reports of move_group.
         models: Models of the placed objects: names, or absolute paths of their files.
     """
+    generators = list(generators)
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
     software = UsedSoftware(
         methods={name: UsedMethod(version, digest) for name, (version, digest) in methods.items()},
         controllers=dict(controllers),
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
-        digests=_digests(parameters, controllers, models),
+        digests=_digests(parameters, controllers, models) | _command_digests(parameters, generators),
         substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS_PARAMETER))),
     )
     # A sequence has a run for each of its motions.
@@ -91,6 +92,14 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
         digests[f"controller {name}"] = hashlib.sha256(settings.encode()).hexdigest()
     joint = {what: joint_digest(paths) for what, paths in files.items() if paths}
     return {**robot_digests(urdf, srdf), **joint, **digests}
+
+
+def _command_digests(parameters: Mapping[str, Any], generators: Iterable[str]) -> dict[str, str]:
+    """Returns the SHA-256 of the files in the commands of external methods, keyed by description."""
+    commands = [_value(parameters, f"{node}/command") for node in generators]
+    words = [Path(str(word)) for command in commands if isinstance(command, list) for word in command]
+    paths = [word for word in words if word.is_absolute() and word.is_file()]
+    return {f"method file {portable_name(path)}": file_digest(path) for path in paths}
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:

@@ -13,7 +13,7 @@ from modular_framework_benchmark.predicates.conditions import Untouched
 from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.world_track import ROBOT, Floats, WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, REACHABLE
+from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, REACHABLE, MethodFault
 
 SLIP_HEIGHT_M = 0.05
 """Height above its start up to which a lost object has slipped; from higher, it was dropped [m]."""
@@ -39,10 +39,12 @@ class FailureClass(Enum):
     DROPPED = "dropped"  # the gripper lost the object higher above its start
     MISPLACED = "misplaced"  # the final position or orientation of the object is wrong
     TIMEOUT = "timeout"
+    INVALID_OUTPUT = "invalid output"  # the method raised an exception, or its result is invalid
     DIED = "component died"
     INVALID = "invalid"
 
 
+_DEATHS = (MethodFault.NOT_STARTED, MethodFault.DIED, MethodFault.LATE)
 _OF_STATUS = {
     EpisodeStatus.INVALID: FailureClass.INVALID,
     EpisodeStatus.BROKEN: FailureClass.DIED,
@@ -96,6 +98,9 @@ def _held_objects(world: WorldTrack | None) -> set[str]:
 
 
 def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> FailureClass:
+    if METHOD_FAULT in report.figures:
+        died = report.figures[METHOD_FAULT] in _DEATHS
+        return FailureClass.DIED if died else FailureClass.INVALID_OUTPUT
     if report.component == "generation":
         reachable = report.figures.get(REACHABLE)
         return FailureClass.UNREACHABLE if reachable == 0.0 and _found_any(report) else FailureClass.NO_CANDIDATE

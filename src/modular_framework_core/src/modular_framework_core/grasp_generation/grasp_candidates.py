@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
 from modular_framework_core.grasp_generation.planning_scene_objects import CropBox, SceneObject
+from modular_framework_ros.reported_figures import Figure
 
 Array = npt.NDArray[np.float64]
 
@@ -69,6 +70,10 @@ class NoCandidatesError(RuntimeError):
     """A method finds no grasp; the message is the cause, which follows "no part ... can be grasped ...: "."""
 
 
+class MethodFaultError(NoCandidatesError):
+    """The method itself failed, which ends the generation for all objects; the message is the cause."""
+
+
 class ReadNumber(Protocol):
     """Function that reads a numeric parameter of a method."""
 
@@ -107,11 +112,24 @@ class GraspMethod(Protocol):
 
 
 @runtime_checkable
-class SeeingMethod(Protocol):
-    """Additional interface of a grasp method that detects objects itself if the planning scene has none."""
+class ConnectedMethod(Protocol):
+    """Additional interface of a grasp method that uses sensors or other processes."""
 
     def connect(self) -> None:
-        """Connects to the sensors; the node calls this method once."""
+        """Connects to the sensors or processes; the node calls this method once."""
+
+
+@runtime_checkable
+class MeasuredMethod(Protocol):
+    """Additional interface of a grasp method that measures figures of its own."""
+
+    def take_figures(self) -> dict[Figure, float]:
+        """Returns the figures of all objects since the previous call."""
+
+
+@runtime_checkable
+class SeeingMethod(ConnectedMethod, Protocol):
+    """Additional interface of a grasp method that detects objects itself if the planning scene has none."""
 
     def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
         """Returns the detected objects.

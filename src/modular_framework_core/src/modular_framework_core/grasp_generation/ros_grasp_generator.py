@@ -18,9 +18,12 @@ from std_srvs.srv import Trigger, TriggerResponse
 from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
 from modular_framework_core.grasp_generation.grasp_candidates import (
+    ConnectedMethod,
     GraspCandidate,
     GraspMethod,
     GraspQuery,
+    MeasuredMethod,
+    MethodFaultError,
     NoCandidatesError,
     SeeingMethod,
 )
@@ -123,7 +126,7 @@ class GraspGenerator:
             )
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
-        if isinstance(self._method, SeeingMethod):
+        if isinstance(self._method, ConnectedMethod):
             self._method.connect()
         # advertised last, because clients take this topic as a sign that the services are ready
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
@@ -273,6 +276,8 @@ class GraspGenerator:
                 except NoGraspError as error:
                     self._stored.replace([], settings.name_prefix)
                     success, text, work.reason = False, str(error), str(error)
+                if isinstance(self._method, MeasuredMethod):
+                    work.figures |= self._method.take_figures()
             self._generated.mark(objects)
             self._publish(success, text)
             return success, text
@@ -294,6 +299,8 @@ class GraspGenerator:
             query = GraspQuery(target, obstacles, support, self._gripper, settings.seed)
             try:
                 found_in.append([(target, candidate) for candidate in self._method.candidates(query)])
+            except MethodFaultError as error:
+                raise NoGraspError(f"the method failed: {error}") from error
             except NoCandidatesError as error:
                 causes.append(str(error))
         ranked = list(heapq.merge(*found_in, key=lambda pair: -pair[1].quality))

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serves a method of any Python environment to the framework, without ROS."""
+
+from mbf_method.grasp_request import CameraView, GraspRequest, Gripper, RobotState, SceneObject
+from mbf_method.grasps import Grasps
+from mbf_method.served_method import ServedMethod, grasp_method
+
+__all__ = [
+    "CameraView",
+    "GraspRequest",
+    "Grasps",
+    "Gripper",
+    "RobotState",
+    "SceneObject",
+    "ServedMethod",
+    "grasp_method",
+]

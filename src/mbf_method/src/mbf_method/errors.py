@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults of a method in another process, one class per kind of fault."""
+
+from __future__ import annotations
+
+
+class MethodError(RuntimeError):
+    """A method in another process did not return a valid result; the message is the cause."""
+
+
+class MethodStartError(MethodError):
+    """The method did not start, or was not ready within its time limit."""
+
+
+class MethodVersionError(MethodError):
+    """The method is of another kind, or speaks another version of the protocol."""
+
+
+class MethodDiedError(MethodError):
+    """The method closed its connection before it returned a result."""
+
+
+class MethodLateError(MethodError):
+    """The method returned no result within its time limit."""
+
+
+class MethodRaisedError(MethodError):
+    """The function of the method raised an exception."""
+
+
+class InvalidOutputError(MethodError):
+    """The result has wrong names, shapes, values or frames."""
+
+
+class TooLargeError(MethodError):
+    """A request or a result exceeds the size limit of its receiver."""

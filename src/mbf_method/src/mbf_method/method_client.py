@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calls a method in another process, with limits of time and size."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, Iterator, Mapping
+
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidURI
+from websockets.frames import CloseCode
+from websockets.sync.client import ClientConnection, connect
+
+from mbf_method.errors import (
+    InvalidOutputError,
+    MethodDiedError,
+    MethodError,
+    MethodLateError,
+    MethodRaisedError,
+    MethodStartError,
+    MethodVersionError,
+    TooLargeError,
+)
+from mbf_method.method_process import MethodProcess
+from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
+
+RETRY_PERIOD_S = 0.05
+EXIT_TIMEOUT_S = 2.0
+"""Maximum wait for the exit code of a process that has closed its connection [s]."""
+
+
+@dataclass(frozen=True)
+class MethodSource:
+    """Where a method runs; exactly one of command and address is set.
+
+    Attributes:
+        command: Program and arguments that start the method.
+        address: Address of a running method, such as ws://127.0.0.1:8700.
+    """
+
+    command: tuple[str, ...] = ()
+    address: str = ""
+
+
+@dataclass(frozen=True)
+class MethodLimits:
+    """Limits of a method.
+
+    Attributes:
+        start_s: Maximum time from the start of the command until the method is ready [s].
+        call_s: Maximum time of a call [s].
+        result_bytes: Maximum size of a result [byte].
+    """
+
+    start_s: float = 60.0
+    call_s: float = 30.0
+    result_bytes: int = 1 << 24
+
+
+@dataclass(frozen=True)
+class CallTimes:
+    """Durations of a call, whose sum is the time from request to result [s].
+
+    Attributes:
+        method_s: Duration of the method's function, measured in its process.
+        queue_s: Wait for other requests, measured in its process.
+        transport_s: Remaining time: encoding, transfer and decoding.
+    """
+
+    method_s: float
+    queue_s: float
+    transport_s: float
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """Result of a call.
+
+    Attributes:
+        message: Fields of the result by name, unchecked.
+        times: Durations of the call.
+    """
+
+    message: Mapping[str, Any]
+    times: CallTimes
+
+
+class MethodClient:
+    """Starts a method or connects to it, and calls it. After a fault, the next call starts or connects again.
+
+    Attributes:
+        needs_camera: Whether requests must contain images of a camera; known after `start`.
+
+    Args:
+        source: Where the method runs.
+        kind: Required kind of the method.
+        limits: Limits of the method.
+    """
+
+    def __init__(self, source: MethodSource, kind: str, limits: MethodLimits) -> None:
+        self._source = source
+        self._kind = kind
+        self._limits = limits
+        self._process: MethodProcess | None = None
+        self._connection: ClientConnection | None = None
+        self.needs_camera = False
+
+    def start(self) -> None:
+        """Starts the method or connects to it, unless it is ready.
+
+        Raises:
+            MethodError: The method is not ready within its time limit, or has another kind or version.
+        """
+        if self._connection is not None:
+            return
+        if bool(self._source.command) == bool(self._source.address):
+            raise MethodStartError("the method needs either a command that starts it, or its address; set one of them")
+        try:
+            if self._source.command:
+                self._process = MethodProcess(self._source.command)
+            self._connection = self._connect(self._process.address if self._process else self._source.address)
+        except Exception:
+            self.close()
+            raise
+
+    def call(self, request: Any) -> MethodResult:
+        """Calls the method.
+
+        Args:
+            request: Dataclass with the inputs.
+
+        Raises:
+            MethodError: The method returns no result; the class tells the kind of fault.
+        """
+        self.start()
+        started_s = time.perf_counter()
+        data = self._exchange(pack(request))
+        if isinstance(data, str):
+            raise MethodRaisedError(
+                f"the function of the method raised {data.strip().splitlines()[-1]}; its log has the traceback"
+            )
+        message = unpack(data)
+        total_s = time.perf_counter() - started_s
+        try:
+            timing = message["server_timing"]
+            method_s, queue_s = (1e-3 * float(timing[name]) for name in ("infer_ms", "queue_ms"))
+            result = dict(message["result"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidOutputError(
+                f"the message of the method has no result with server_timing: {error!r}"
+            ) from error
+        return MethodResult(result, CallTimes(method_s, queue_s, max(0.0, total_s - method_s - queue_s)))
+
+    def close(self) -> None:
+        """Closes the connection, and ends the process if this client has started it."""
+        connection, process = self._connection, self._process
+        self._connection = self._process = None
+        if connection is not None:
+            _shut_down(connection)
+        if process is not None:
+            process.close()
+
+    def _connect(self, address: str) -> ClientConnection:
+        """Connects to the method as soon as it listens, and checks kind and version."""
+        deadline_s = time.monotonic() + self._limits.start_s
+        while True:
+            left_s = max(RETRY_PERIOD_S, deadline_s - time.monotonic())
+            try:
+                connection = connect(
+                    address,
+                    open_timeout=left_s,
+                    max_size=self._limits.result_bytes,
+                    compression=None,
+                    ping_interval=None,
+                    close_timeout=EXIT_TIMEOUT_S,
+                    proxy=None,
+                )
+                break
+            except (OSError, InvalidHandshake, InvalidURI) as error:
+                if self._process is not None and (ended := self._process.end_text()):
+                    raise MethodStartError(f"{ended} before the method was ready; its output is in the log") from error
+                if not isinstance(error, OSError):
+                    raise MethodStartError(f"{address} is not the address of a method: {error}") from error
+                if time.monotonic() > deadline_s:
+                    raise MethodStartError(
+                        f"the method at {address} was not ready within {self._limits.start_s:g} s: {error}"
+                    ) from error
+                time.sleep(RETRY_PERIOD_S)
+        try:
+            self._check_greeting(address, connection.recv(timeout=left_s))
+        except (ConnectionClosed, TimeoutError, MethodError) as error:
+            _shut_down(connection)
+            if isinstance(error, MethodError):
+                raise
+            raise MethodStartError(f"the server at {address} does not state its method: {error}") from error
+        return connection
+
+    def _check_greeting(self, address: str, data: Any) -> None:
+        greeting = unpack(data) if isinstance(data, bytes) else {}
+        found = [greeting.get(name) for name in ("protocol", "version", "kind")]
+        if found != [PROTOCOL, VERSION, self._kind]:
+            raise MethodVersionError(
+                f"the server at {address} says protocol {found[0]!r}, version {found[1]!r}, kind {found[2]!r}; "
+                f"required: {PROTOCOL!r}, {VERSION}, {self._kind!r}; install the package mbf_method of this framework"
+            )
+        self.needs_camera = bool(greeting.get("needs_camera"))
+
+    def _exchange(self, request: bytes) -> Any:
+        """Sends a request and returns the response; closes the connection and the process on failure."""
+        assert self._connection is not None
+        try:
+            with _deadline(self._connection, self._limits.call_s) as expired:
+                self._connection.send(request)
+                return self._connection.recv()
+        except ConnectionClosed as closed:
+            ended = self._process.end_text(EXIT_TIMEOUT_S) if self._process and not expired.is_set() else ""
+            self.close()
+            if expired.is_set():
+                raise MethodLateError(f"the method returned no result within {self._limits.call_s:g} s") from closed
+            if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
+                raise TooLargeError(
+                    f"the result is larger than {self._limits.result_bytes} bytes: {closed.sent.reason}"
+                ) from closed
+            if closed.rcvd is not None and closed.rcvd.code == CloseCode.MESSAGE_TOO_BIG:
+                raise TooLargeError(f"the request of {len(request)} bytes is larger than allowed") from closed
+            raise MethodDiedError(f"the method died: {ended or f'the connection was closed ({closed})'}") from closed
+
+
+@contextmanager
+def _deadline(connection: ClientConnection, limit_s: float) -> Iterator[threading.Event]:
+    """Shuts a connection down after a time limit, and sets the event; this ends waits in `send` and `recv`."""
+    expired = threading.Event()
+
+    def expire() -> None:
+        expired.set()
+        _shut_down(connection)
+
+    timer = threading.Timer(limit_s, expire)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield expired
+    finally:
+        timer.cancel()
+
+
+def _shut_down(connection: ClientConnection) -> None:
+    """Ends a connection without the closing handshake, to which a hanging method does not respond."""
+    with suppress(OSError):
+        connection.socket.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The package is usable in a foreign environment: Python 3.8, without ROS, from the example of its page."""
+
+from __future__ import annotations
+
+import ast
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mbf_method import GraspRequest
+from mbf_method.grasps import checked_grasps
+from mbf_method.wire import pack, unpack
+
+ROOT = Path(__file__).parents[3]
+EXAMPLE = ROOT / "docs/examples/my_grasp_method.py"
+MODULES = [EXAMPLE, *sorted((ROOT / "src/mbf_method/src/mbf_method").glob("*.py"))]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: path.name)
+def test_a_module_runs_in_python_3_8_without_ros(module: Path) -> None:
+    tree = ast.parse(module.read_text(), feature_version=(3, 8))
+    names = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    names |= {item.name for node in ast.walk(tree) if isinstance(node, ast.Import) for item in node.names}
+    foreign = {name.partition(".")[0] for name in names} - set(sys.stdlib_module_names)
+    assert foreign <= {"mbf_method", "msgpack", "numpy", "websockets"}
+    decorators = [
+        decorator
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        for decorator in node.decorator_list
+        if isinstance(decorator, ast.Call)
+    ]
+    assert all(keyword.arg == "frozen" for call in decorators for keyword in call.keywords), "slots came in 3.10"
+
+
+def test_the_page_shows_the_example() -> None:
+    code = EXAMPLE.read_text().split("\n", 1)[1]  # without the licence
+    assert f"```python\n{code}```" in (ROOT / "docs/own_method.md").read_text()
+
+
+def test_the_example_grasps_a_box_across_its_narrow_side(box_request: GraspRequest) -> None:
+    method = runpy.run_path(str(EXAMPLE))["narrow_grasps"]
+    grasps = checked_grasps(unpack(pack(method(box_request))), box_request, 1000)
+    best = int(np.argmax(grasps.scores))
+    assert grasps.widths[best] == pytest.approx(0.04)
+    assert grasps.poses[best, :3, 0] == pytest.approx([1.0, 0.0, 0.0])
+    assert grasps.poses[best, :3, 3] == pytest.approx([0.0, 0.0, 0.085])
