@@ -27,6 +27,8 @@ def succeeded(number: int) -> dict[str, Any]:
 class FakeStack:
     """Answers requests and writes a file per request into the folder of its episode."""
 
+    foul = ""
+
     def __init__(self, answer: Answer) -> None:
         self._answer = answer
         self.requests: list[Mapping[str, Any]] = []
@@ -39,7 +41,7 @@ class FakeStack:
         return self._answer(len(self.requests))
 
     def abort(self, timeout_s: float) -> dict[str, Any]:
-        return {"requested_s": 0.0}
+        return {"requested_s": 0.0, "foul": self.foul}
 
     def last_output(self) -> str:
         return "the launch said nothing"
@@ -96,6 +98,10 @@ def test_a_first_run_without_an_end_is_the_record(tmp_path: Path, monkeypatch: p
 
     (record,), (stack,) = run_episodes(tmp_path, monkeypatch, never)
     assert record.status is EpisodeStatus.TIMED_OUT and len(stack.requests) == 1
+    monkeypatch.setattr(FakeStack, "foul", "a node changed the world")
+    (tmp_path / "with foul").mkdir()
+    (record,), _ = run_episodes(tmp_path / "with foul", monkeypatch, never)
+    assert record.status is EpisodeStatus.INVALID and record.cause == "a node changed the world"
 
 
 @pytest.mark.parametrize(("run_s", "runs"), [(10.0, 2), (12.0, 1)])

@@ -28,6 +28,9 @@ JOINT_CONTROLLER_STATE = "control_msgs/JointControllerState"
 PLANNING_NODE = "/move_group"
 MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object", "task_status"
 REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
+COMPONENT_REPORTS = "component_reports"
+RECORDED_COMPONENTS = frozenset({"planning", *ACTIONS.values()})
+"""Components that are recorded from messages of the framework's nodes; no other node may report them."""
 SUCCEEDED = 3
 """Status of actionlib_msgs/GoalStatus."""
 
@@ -47,7 +50,7 @@ class Samples:
         paths: Motions that move_group displays.
         components: (real time [s], report of a component).
         ends: Statuses of the task node on the ends of tasks.
-        forgeries: (topic, sender) of messages from a node that does not own the topic; they are dropped.
+        forgeries: (topic, sender) of messages from a node that may not send them; they are dropped.
     """
 
     def __init__(self) -> None:
@@ -56,6 +59,7 @@ class Samples:
         self._subscribers: dict[str, Any] = {}
         self._goals: dict[str, dict[str, Any]] = {}
         self._results: dict[str, dict[str, Any]] = {}
+        self._servers: dict[str, str] = {}
         self.clear()
 
     def clear(self) -> None:
@@ -99,7 +103,7 @@ class Samples:
             (MODELS, rospy.AnyMsg, SIMULATION_NODE, lambda _: None),
             (GRASPED, String, SIMULATION_NODE, lambda _: None),
             (TASK_STATUS, String, TASK_NODE, self._on_status),
-            ("component_reports", String, "", lambda message: self.components.append(_timed_report(message))),
+            (COMPONENT_REPORTS, String, "", self._on_component_report),
             (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_timed_report(message))),
             (PATHS, DisplayTrajectory, PLANNING_NODE, lambda message: self.paths.append(message)),
         ):
@@ -134,11 +138,11 @@ class Samples:
             self._subscribers[topic] = rospy.Subscriber(topic, kind, receive, tcp_nodelay=True)
 
     def interference(self) -> str:
-        """Returns the nodes that publish on topics of the simulation and the task node; "" for none."""
+        """Returns the nodes that publish in place of the simulation, the task or another component; "" for none."""
         return "; ".join(
             f"a node named '{sender}' publishes {topic}"
             for topic, sender in sorted(self.forgeries)
-            if topic in (MODELS, GRASPED, TASK_STATUS)
+            if topic in (MODELS, GRASPED, TASK_STATUS, *self._servers) or topic.startswith(COMPONENT_REPORTS)
         )
 
     def _controller(self, name: str) -> Callable[[Any], None]:
@@ -156,8 +160,29 @@ class Samples:
         name, component = topic.rpartition("/")[0], ACTIONS[type_name]
         goal = roslib.message.get_message_class(type_name)
         result = roslib.message.get_message_class(type_name.removesuffix("Goal") + "Result")
+        if component == "execution":
+            self._servers[f"{name}/result"] = PLANNING_NODE
         self._subscribe(topic, goal, lambda message: self.add_goal(component, message))
-        self._subscribe(f"{name}/result", result, self.add_result)
+        self._subscribe(f"{name}/result", result, lambda message: self._on_result(f"{name}/result", message))
+
+    def _on_result(self, topic: str, message: Any) -> None:
+        """Adds a result of an action's server: move_group, or the first node that sends a result; notes other nodes."""
+        sender = message._connection_header["callerid"]
+        server = self._servers.setdefault(topic, sender)
+        if sender == server:
+            self.add_result(message)
+        else:
+            self.forgeries.add((topic, sender))
+
+    def _on_component_report(self, message: String) -> None:
+        """Adds the report of a component, unless it stands for a component that another node reports."""
+        wall_s, report = _timed_report(message)
+        if report["component"] in RECORDED_COMPONENTS:
+            self.forgeries.add(
+                (f"{COMPONENT_REPORTS} of '{report['component']}'", message._connection_header["callerid"])
+            )
+        else:
+            self.components.append((wall_s, report))
 
     def _on_status(self, message: String) -> None:
         status = json.loads(message.data)

@@ -23,7 +23,7 @@ from modular_framework_benchmark.predicates.predicate import Stage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import SettingsError
 
-ABORT_TIMEOUT_S = 15.0
+ABORT_TIMEOUT_S = 20.0
 """Time for the recorder to write its data when an episode is aborted [s]."""
 
 
@@ -121,10 +121,11 @@ class TaskEpisodeRunner:
             return end.broken(str(error))
         except TimeoutError:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
-            cause = f"no end within {settings.time_limit:g} s; {stack.last_output()}"
-            # The method is not called before the world is ready.
-            status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
-            return end.with_status(status, cause, answer)
+            if not answer.get("foul"):
+                cause = f"no end within {settings.time_limit:g} s; {stack.last_output()}"
+                # The method is not called before the world is ready.
+                status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
+                return end.with_status(status, cause, answer)
         if "fault" in answer:
             return end.broken(stack.root_cause(str(answer["fault"])))
         if answer.get("foul"):

@@ -32,7 +32,7 @@ SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE, PERCEPTION_SERVICE = (
 )
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
 ABORTED_TIMEOUT_S = 5.0
-"""Wait for the record of an episode that was aborted, whose simulation may hang [s]."""
+"""Maximum duration of a call after an episode was aborted, because its simulation may hang [s]."""
 SERVICE_TIMEOUT_S = 60.0  # long enough for a convex decomposition of a mesh
 
 REST_M_S, REST_RAD_S = 0.02, 0.2
@@ -135,14 +135,17 @@ class InterferenceError(WorldError):
     """An episode is invalid, because the basis of its judgement does not come from the simulation."""
 
 
-def judge() -> Judgement:
+def judge(timeout_s: float = SERVICE_TIMEOUT_S) -> Judgement:
     """Requests the state of the world from the simulation.
+
+    Args:
+        timeout_s: Maximum duration of the call [s].
 
     Raises:
         InterferenceError: Another node offers the referee's service.
         WorldError, CallError: The simulation does not answer.
     """
-    return Judgement(**json.loads(_ask_simulation(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)))
+    return Judgement(**json.loads(_ask_simulation(REFEREE_SERVICE, Trigger, TriggerRequest(), timeout_s)))
 
 
 def begin_world_record() -> None:
