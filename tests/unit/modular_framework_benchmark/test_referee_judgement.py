@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,16 +11,14 @@ import rospy
 from actionlib_msgs.msg import GoalID
 from moveit_msgs.msg import ExecuteTrajectoryActionGoal, ExecuteTrajectoryActionResult
 
-from modular_framework_benchmark.episodes import ros_episode_recorder, ros_samples
-from modular_framework_benchmark.episodes.ros_episode_recorder import (
-    EpisodeAbortedError,
-    EpisodeRecorder,
-    EpisodeRequest,
-)
+from modular_framework_benchmark.episodes import ros_samples, ros_world
 from modular_framework_benchmark.episodes.ros_samples import GRASPED, REPORTS, TASK_STATUS, Samples
-from modular_framework_benchmark.episodes.ros_world import InterferenceError, Judgement, WorldError
-from modular_framework_benchmark.records.used_software import UsedSoftware
-from modular_framework_core.msg import GraspActionResult
+from modular_framework_benchmark.episodes.ros_world import (
+    InterferenceError,
+    Judgement,
+    WorldError,
+    aborted_interference,
+)
 
 RESTART = {"number": 4, "time_s": 0.01, "what": "/gazebo/restart", "caller": "/episode_recorder"}
 RESET = {"number": 5, "time_s": 1.0, "what": "/gazebo/reset_world", "caller": "/task"}
@@ -67,11 +62,10 @@ class WireFake:
         self.callbacks[topic] = callback
 
     @classmethod
-    def send(cls, topic: str, sender: str, message: Any) -> None:
-        """Delivers a message, or a text, with the name of its sender."""
-        sent = SimpleNamespace(data=message) if isinstance(message, str) else message
-        sent._connection_header = {"callerid": sender}
-        cls.callbacks[topic](sent)
+    def send(cls, topic: str, sender: str, text: str = "", **fields: Any) -> None:
+        """Delivers a text, or a message with the given fields, with the name of its sender."""
+        header = {"_connection_header": {"callerid": sender}}
+        cls.callbacks[topic](SimpleNamespace(**header, **(fields or {"data": text})))
 
 
 class MasterFake:
@@ -109,6 +103,13 @@ def test_messages_of_another_node_than_the_topics_own_are_dropped_and_named(monk
     assert samples.interference() == "" and samples.ends == []
 
 
+def ended(number: str) -> dict[str, Any]:
+    """The fields of a result that says that a goal succeeded."""
+    result = ExecuteTrajectoryActionResult()
+    result.status.goal_id.id, result.status.status, result.result.error_code.val = number, ros_samples.SUCCEEDED, 1
+    return {"header": result.header, "status": result.status, "result": result.result}
+
+
 def test_a_method_cannot_report_plans_and_motions_in_place_of_those_who_make_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -117,15 +118,13 @@ def test_a_method_cannot_report_plans_and_motions_in_place_of_those_who_make_the
     samples = Samples()
     samples.connect()
     WireFake.send("component_reports", "/method", '{"component": "generation"}')
-    WireFake.send("/grasp/result", "/grasp_server", GraspActionResult())
-    WireFake.send("/execute_trajectory/result", "/move_group", ExecuteTrajectoryActionResult())
+    WireFake.send("/grasp/result", "/grasp_server", **ended("a"))
+    WireFake.send("/execute_trajectory/result", "/move_group", **ended("b"))
     assert samples.interference() == "" and len(samples.components) == 1
 
-    forged = ExecuteTrajectoryActionResult()
-    forged.status.goal_id.id = "never executed"
     WireFake.send("component_reports", "/method", '{"component": "planning"}')
-    WireFake.send("/execute_trajectory/result", "/method", forged)
-    WireFake.send("/grasp/result", "/method", GraspActionResult())
+    WireFake.send("/execute_trajectory/result", "/method", **ended("never executed"))
+    WireFake.send("/grasp/result", "/method", **ended("c"))
     assert samples.interference() == (
         "a node named '/method' publishes /execute_trajectory/result; a node named '/method' publishes /grasp/result; "
         "a node named '/method' publishes component_reports of 'planning'"
@@ -145,37 +144,12 @@ def test_a_method_cannot_report_plans_and_motions_in_place_of_those_who_make_the
     ],
 )
 def test_an_episode_that_is_aborted_at_its_time_limit_is_judged(
-    simulation: Judgement | WorldError, foul: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    simulation: Judgement | WorldError, foul: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def judge(_timeout_s: float) -> Judgement:
         if isinstance(simulation, WorldError):
             raise simulation
         return simulation
 
-    def run_task(_request: Any, answer: dict[str, Any]) -> None:
-        answer["interventions"] = 4
-        aborted.set()
-        raise EpisodeAbortedError
-
-    aborted = threading.Event()
-    recorder = EpisodeRecorder(aborted, launch=1)
-    recorder._time = SimpleNamespace(enabled=False, held=lambda _what: contextlib.nullcontext())
-    recorder._samples.connect = lambda: None
-    for name, value in {
-        "judge": judge,
-        "end_world_record": lambda must_answer: {},
-        "write_recording": lambda *_, **__: {},
-        "write_parameters": lambda _folder: ({}, ""),
-        "running_stack": lambda *_: UsedSoftware(),
-        "_publishers": lambda _topic: [],
-    }.items():
-        monkeypatch.setattr(ros_episode_recorder, name, value)
-    for name in ("_wait_for_stack", "_begin", "_store_part_end"):
-        monkeypatch.setattr(recorder, name, lambda *_: None)
-    monkeypatch.setattr(recorder, "_run_task", run_task)
-    monkeypatch.setattr(recorder, "_stop_task", lambda: None)
-    request = EpisodeRequest(
-        folder=str(tmp_path), objects=(), target="", hold_s=0.0, shake_s=0.0, bag=False, method_nodes=(),
-        controllers=(), parameters={}, begun=0.0,
-    )  # fmt: skip
-    assert recorder.run(request)["foul"] == foul
+    monkeypatch.setattr(ros_world, "judge", judge)
+    assert aborted_interference(since=4) == foul

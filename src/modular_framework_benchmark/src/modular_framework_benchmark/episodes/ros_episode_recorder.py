@@ -36,10 +36,10 @@ from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import (
-    ABORTED_TIMEOUT_S,
     SPAWN_SERVICE,
     InterferenceError,
     WorldError,
+    aborted_interference,
     begin_world_record,
     end_world_record,
     judge,
@@ -141,7 +141,8 @@ class EpisodeRecorder:
                     raise
                 answer["aborted"] = True
                 self._stop_task()
-                answer["foul"] = self._foul_of_aborted(answer)
+                judged = aborted_interference(answer["interventions"]) if "interventions" in answer else ""
+                answer["foul"] = judged or self._samples.interference()
             except InterferenceError as error:
                 answer["foul"] = str(error)
                 if not self._samples.ends:
@@ -245,18 +246,6 @@ class EpisodeRecorder:
         wait_until(lambda: samples.latest_s() >= latest_s and samples.actions_ended(), SAMPLES_TIMEOUT_S)
         answer["foul"] = judge().interference(answer["interventions"]) or self._samples.interference()
         self._store_part_end(request, answer, "checked")
-
-    def _foul_of_aborted(self, answer: dict[str, Any]) -> str:
-        """Returns the interference until an episode was aborted; the simulation may no longer answer."""
-        judged = ""
-        try:
-            if "interventions" in answer:
-                judged = judge(ABORTED_TIMEOUT_S).interference(answer["interventions"])
-        except InterferenceError as error:
-            judged = str(error)
-        except (WorldError, CallError) as error:
-            rospy.logwarn("the aborted episode is judged without the simulation: %s", error)
-        return judged or self._samples.interference()
 
     def _now(self) -> float:
         """Returns the time of the simulation [s]; while time is held, from a service because the clock topic lags."""

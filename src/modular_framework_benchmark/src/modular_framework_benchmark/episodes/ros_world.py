@@ -148,6 +148,21 @@ def judge(timeout_s: float = SERVICE_TIMEOUT_S) -> Judgement:
     return Judgement(**json.loads(_ask_simulation(REFEREE_SERVICE, Trigger, TriggerRequest(), timeout_s)))
 
 
+def aborted_interference(since: int) -> str:
+    """Returns the interference since an intervention in an episode that was aborted; "" if the simulation hangs.
+
+    Args:
+        since: Number of the intervention.
+    """
+    try:
+        return judge(ABORTED_TIMEOUT_S).interference(since)
+    except InterferenceError as error:
+        return str(error)
+    except (WorldError, CallError) as error:
+        rospy.logwarn("the aborted episode is judged without the simulation: %s", error)
+        return ""
+
+
 def begin_world_record() -> None:
     """Begins a record of the world in the simulation.
 

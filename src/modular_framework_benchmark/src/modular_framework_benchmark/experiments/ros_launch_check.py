@@ -8,6 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
+from modular_framework_benchmark.experiments.ros_launch_files import (
+    ARGUMENTS,
+    REGIONS,
+    argument_faults,
+    named_entry_faults,
+    program_faults,
+    sensor_faults,
+)
 from modular_framework_benchmark.experiments.ros_pipeline_names import (
     DETECTOR,
     MANAGER,
@@ -23,11 +31,8 @@ from modular_framework_core.launching.ros_declared_names import DeclaredNames, L
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
 from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import (
-    JOINT_STATES_FILE,
-    TRAJECTORIES_FILE,
     KnownNames,
     PlannerNames,
-    mapping_in_file,
     names_of_config,
 )
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -41,8 +46,7 @@ from modular_framework_ros.allowed_names import closest, listing, nearest
 
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"
-RUN_TASK, ARGUMENTS = "run_task", "arguments"
-REGIONS = "/regions"
+RUN_TASK = "run_task"
 
 
 class LaunchCheck:
@@ -84,6 +88,9 @@ class LaunchCheck:
                 *(self._planner_faults() if self._node is not None else ()),
                 *controller_faults(self.launch, self._robot.movable_joints),
                 *hardware_faults(self._names, self.launch),
+                *program_faults(self.launch.nodes),
+                *sensor_faults(self.launch),
+                *argument_faults(self.launch, self._robot),
                 *self._task_faults(),
             ]
         except (PlanningError, ModelError) as error:
@@ -206,12 +213,8 @@ class LaunchCheck:
             yield LaunchFault(name, f"{text}{nearest(machine, machines)}", ARGUMENTS)
 
     def _named_state_faults(self, config: str) -> Iterator[LaunchFault]:
-        """Yields unknown joints and joint states in the files of named states and trajectories."""
-        joints = self._robot.movable_joints
-        try:
-            faults = list(named_joint_faults(Path(config), joints)) if config and joints else []
-        except ValueError as error:
-            faults = [str(error)]
+        """Yields the invalid entries in the files of named states, poses and trajectories."""
+        faults = named_entry_faults(Path(config), self._robot.movable_joints) if config else ()
         yield from (LaunchFault(CONFIGURATION, text, ARGUMENTS) for text in faults)
 
     def _script_faults(self, parameters: Mapping[str, Any]) -> Iterator[LaunchFault]:
@@ -256,38 +259,3 @@ def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:
         roslaunch.core.RLException: The launch file is invalid.
     """
     return [fault.text for fault in LaunchCheck(preview_launch(path, arguments)).faults()]
-
-
-def named_joint_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:
-    """Yields a sentence for each unknown joint of a named state and each unknown state of a trajectory.
-
-    A state without any joint similar to the robot's joints is ignored, because it belongs to a different robot.
-
-    Args:
-        folder: Configuration folder.
-        joints: Joint names of the robot.
-
-    Raises:
-        ValueError: A file cannot be read.
-    """
-    states = mapping_in_file(folder / JOINT_STATES_FILE)
-    for state, positions in (states or {}).items():
-        names = list(map(str, positions)) if isinstance(positions, Mapping) else []
-        if not any(name in joints or closest(name, joints) for name in names):
-            continue
-        for name in names:
-            if name not in joints:
-                hint = f"{listing(joints)}{nearest(name, joints)}"
-                yield f"{folder / JOINT_STATES_FILE}: '{state}' names no joint: '{name}'; {hint}"
-    if states is None:
-        return
-    for trajectory, points in (mapping_in_file(folder / TRAJECTORIES_FILE) or {}).items():
-        for name in _states_of(points):
-            if name not in states:
-                hint = f"{listing(map(str, states))}{nearest(name, map(str, states))}"
-                yield f"{folder / TRAJECTORIES_FILE}: '{trajectory}' names no joint state: '{name}'; {hint}"
-
-
-def _states_of(points: Any) -> list[str]:
-    waypoints = points if isinstance(points, list) else []
-    return [str(point["name"]) for point in waypoints if isinstance(point, Mapping) and "name" in point]

@@ -132,8 +132,10 @@ class DeclaredNames:
         """Yields a fault for each misspelt parameter, except for names in ``without``.
 
         A private parameter of a closed node is misspelt if the node does not read it. Other names may belong to plugins
-        and foreign programs. They are misspelt if they differ slightly from a declared name of the same namespace.
+        and foreign programs. They are misspelt if they differ slightly from a declared name of the same namespace, or
+        if their first part differs slightly from the name of a node; a misspelt node is reported once.
         """
+        misspelt_nodes: dict[str, str] = {}
         namespaces = sorted({node.namespace for node in self._launch.nodes}, key=len, reverse=True)
         for name in self._launch.parameters:
             if name in without or name in self.known or name.startswith((*self._trees, *self._undeclared_nodes)):
@@ -145,8 +147,18 @@ class DeclaredNames:
                 continue
             parent = open_node or next((namespace for namespace in namespaces if name.startswith(namespace)), "/")
             meant = self._meant(name, parent, max_parts=MAX_NAME_PARTS if open_node else 1)
+            first = name.split("/")[1]
+            if not meant and first not in misspelt_nodes:
+                misspelt_nodes[first] = meant = self._meant_node(name)
             if meant:
                 yield LaunchFault(name, f"no node reads the parameter '{name}'; did you mean '{meant}'?")
+
+    def _meant_node(self, name: str) -> str:
+        """Returns a parameter's name with its first part replaced by the node that it misspells, or ""."""
+        first, _, rest = name.removeprefix("/").partition("/")
+        nodes = {node.name.split("/")[1] for node in self._launch.nodes}
+        meant = next((node for node in sorted(nodes) if rest and first not in nodes and misspelling(first, node)), "")
+        return f"/{meant}/{rest}" if meant else ""
 
     def _meant(self, name: str, parent: str, max_parts: int) -> str:
         """Returns the declared name that differs from a name slightly and in one part only, or "".

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
+from modular_framework_ros.allowed_names import nearest
 
 WAYPOINT_KEYS = ("name", "interpolate_time", "pause_time")
 
@@ -71,13 +72,16 @@ def parse_waypoint(entry: Entry) -> Waypoint:
     return Waypoint(entry, fields["name"].text(), interpolate_time_s, pause_time_s)
 
 
-def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -> TimedTrajectory:
+def time_trajectory(
+    name: str, waypoints: list[Waypoint], lookup: JointLookup, known_states: Collection[str] = ()
+) -> TimedTrajectory:
     """Returns the trajectory through waypoints; a pause adds a second point with the same positions.
 
     Args:
         name: Name of the trajectory.
         waypoints: At least one waypoint.
         lookup: Function that returns {joint: position [rad or m]} of a named joint state, or None if unknown.
+        known_states: Names of joint states for the message on an unknown one.
 
     Raises:
         EntryError: A joint state is unknown, or its joints differ from the joints of the first waypoint.
@@ -91,6 +95,7 @@ def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -
             raise waypoint.entry.fault(
                 f"no joint state named '{waypoint.joint_state_name}' is stored; "
                 "add it to the named joint states or correct the name"
+                f"{nearest(waypoint.joint_state_name, known_states)}"
             )
         names = tuple(sorted(joints))
         joint_names = joint_names or names
@@ -108,12 +113,15 @@ def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -
     return TimedTrajectory(name, joint_names, tuple(points))
 
 
-def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajectory], list[EntryError]]:
+def load_trajectories(
+    path: Path, lookup: JointLookup, known_states: Collection[str] = ()
+) -> tuple[list[TimedTrajectory], list[EntryError]]:
     """Reads a file of trajectories.
 
     Args:
         path: YAML file, name to list of waypoints.
         lookup: Function that returns {joint: position [rad or m]} of a named joint state, or None if unknown.
+        known_states: Names of joint states for the message on an unknown one.
 
     Returns:
         The valid trajectories in file order, and one error per invalid entry or for an unreadable file.
@@ -123,6 +131,6 @@ def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajec
         waypoints = [parse_waypoint(item) for item in entry.items()]
         if not waypoints:
             raise entry.fault("contains no waypoint; write at least one waypoint")
-        return time_trajectory(entry.key, waypoints, lookup)
+        return time_trajectory(entry.key, waypoints, lookup, known_states)
 
     return read_each_entry(path, parse_trajectory)

@@ -16,7 +16,8 @@ from modular_framework_core.files.atomic_files import read_text
 from modular_framework_urdf.srdf_reader import read_srdf
 
 JOINT_STATES_FILE, TRAJECTORIES_FILE = "named_joint_states.yaml", "named_trajectories.yaml"
-_FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": "named_poses.yaml"}
+POSES_FILE = "named_poses.yaml"
+_FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": POSES_FILE}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
 PLANNER = "planner"

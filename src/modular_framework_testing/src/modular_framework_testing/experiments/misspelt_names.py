@@ -531,7 +531,32 @@ CASES = [
     in_launch("seed:=-4", "is -4; allowed: a whole number, at least 0"),
     in_launch("task_constructor_script:=simulation_pik.yaml", "simulation_pik.yaml"),
     in_launch("planner_name:=RRTConect", "did you mean 'RRTConnect'", "panda_hand_robot"),
+    in_launch("regions:={goal: {x: 3}}", "region 'goal' is {'x': 3}; allowed: spans"),
+    in_launch("regions:={goal: {x: [0.2, 0.1]}}", "region 'goal' is .*allowed: spans"),
+    in_launch("regions:=5", "'regions': the value is 5; allowed: spans"),
+    in_launch("simulation_starting_pose:=-J elbo_joint 1.0", "did you mean 'elbow_joint'"),
+    in_launch("simulation_starting_pose:=abc", "'simulation_starting_pose': .*abc"),
+    in_launch("manipulator_prefix:=ezgriper", "'ezgriper', but no link name contains it; the links are: .*ezgripper"),
     in_config("motion_planner_config.yaml", "planner_name", "BKPIECEE", "did you mean 'BKPIECE'"),
+    in_config(
+        "generative_methods_config.yaml", "top_down_grasp_generatr", {"yaw_step": 0.1}, "'/top_down_grasp_generator/yaw"
+    ),
+    in_config("sensors_config.yaml", "fixed_kinect", {"frame_id": "a", "frame_rol": 0.0}, "frame_roll"),
+    in_config("sensors_config.yaml", "fixed_kinect/frame_x", "left", "left.*number"),
+    in_config("named_poses.yaml", "mine", {"reference_frame": "world", "positon": {"x": 1}}, "positon"),
+    in_config("named_joint_states.yaml", "mine", {"elbow_joint": "high"}, "high.*number"),
+    in_config(
+        "named_trajectories.yaml",
+        "mine",
+        [{"name": "stability_pose", "interpolate_tme": 1.0}],
+        r"interpolate_tme.*interpolate_time",
+    ),
+    in_config(
+        "manipulator_controller_parameters.yaml",
+        "manipulator_controller_action_server_type",
+        "moveit_grasp_action_servr",
+        "has no program 'moveit_grasp_action_servr'.*did you mean 'moveit_grasp_action_server'",
+    ),
     in_config("motion_planner_config.yaml", "robot_speed_factor", 1.5, "is 1.5; allowed: a number, above 0"),
     in_config(
         "motion_planner_config.yaml", "arm_group_name", "arm_and_manipulatr", "did you mean 'arm_and_manipulator'"
@@ -550,7 +575,7 @@ CASES = [
         "named_trajectories.yaml",
         "mine",
         [{"name": "stability_pos", "interpolate_time": 1.0}],
-        "no joint state: 'stability_pos'.*did you mean 'stability_pose'",
+        "no joint state named 'stability_pos' is stored.*did you mean 'stability_pose'",
     ),
     # Hardware and controllers
     in_hardware("UrArmRobotHW", "UrArmRobotHw", "did you mean 'modular_framework_drivers/UrArmRobotHW'"),
