@@ -112,6 +112,34 @@ def test_a_spawner_takes_type_and_parameters_of_its_controllers(tmp_path: Path) 
     assert context.parameters.values() == {"/arm/type": "joint_state_controller/JointStateController"}
 
 
+def test_a_spawner_takes_the_type_in_the_section_of_its_controller(tmp_path: Path) -> None:
+    arm = f"{{type: {TRAJECTORY}, command_interfaces: [effort], joints: [fr3_joint1, fr3_joint2]}}"
+    hand = "{type: position_controllers/GripperActionController, allow_stalling: true, joint: fr3_finger_joint1}"
+    (tmp_path / "p.yaml").write_text(
+        f"fr3_arm_controller:\n  ros__parameters: {arm}\n/**/gripper_action_controller:\n  ros__parameters: {hand}\n"
+    )
+    arguments = ["fr3_arm_controller", "gripper_action_controller", "--param-file", str(tmp_path / "p.yaml")]
+    values = visited(Node(package="controller_manager", executable="spawner", arguments=arguments)).parameters.values()
+    assert values["/fr3_arm_controller/type"] == "effort_controllers/JointTrajectoryController"
+    assert values["/fr3_arm_controller/joints"] == ["fr3_joint1", "fr3_joint2"]
+    assert values["/gripper_action_controller/type"] == "position_controllers/GripperActionController"
+    assert values["/gripper_action_controller/joint"] == "fr3_finger_joint1"
+    assert values["/gripper_action_controller/allow_stalling"] is True
+
+
+@pytest.mark.parametrize("entry", ["front_wheel_joint", "{name: front_wheel_joint}"])
+def test_names_of_extra_joints_are_entries_of_ros_1(tmp_path: Path, entry: str) -> None:
+    (tmp_path / "p.yaml").write_text(
+        "/bmx/controller_manager:\n  ros__parameters:\n"
+        "    joint_state_broadcaster: {type: joint_state_broadcaster/JointStateBroadcaster}\n"
+        "/bmx/joint_state_broadcaster:\n"
+        f"  ros__parameters: {{use_local_topics: false, extra_joints: [{entry}], frame_id: base_footprint}}\n"
+    )
+    options = {"namespace": "bmx", "parameters": [str(tmp_path / "p.yaml")]}
+    values = visited(Node(package="controller_manager", executable="ros2_control_node", **options)).parameters.values()
+    assert values["/bmx/joint_state_broadcaster/extra_joints"] == [{"name": "front_wheel_joint"}]
+
+
 def test_rviz_brings_the_marker_for_goals_only_with_moveit() -> None:
     moveit = {"robot_description_semantic": "<robot name='a'/>"}
     rviz = visited(

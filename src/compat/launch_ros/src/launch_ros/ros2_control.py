@@ -137,8 +137,8 @@ def manager_parameters(sources: Sequence[ParameterSource], namespace: str, name:
 def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[str, Any]]:
     """Returns the controllers with their parameters, converted to ROS 1.
 
-    A ROS 2 file lists the controllers and types in the controller manager's section and has a section per controller;
-    a ROS 1 file has a mapping with a type per controller.
+    A ROS 2 file lists the controllers and types in the controller manager's section and has a section per controller,
+    which may contain the type instead; a ROS 1 file has a mapping with a type per controller.
     """
     types: dict[str, str] = {}
     found: dict[str, dict[str, Any]] = {}
@@ -152,7 +152,9 @@ def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[
             inner = nest_dots(values)
             name = pattern.rpartition("/")[2]
             own = {key: value for key, value in inner.items() if _is_controller(value)}
-            types |= {name: str(value["type"]) for name, value in own.items()}
+            types |= {key: str(value["type"]) for key, value in own.items()}
+            if _is_controller(inner):
+                types.setdefault(name, str(inner["type"]))
             if not own and name not in WILDCARDS:
                 merge(found.setdefault(name, {}), inner)
     for name, parameters in found.items():
@@ -176,6 +178,8 @@ def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str,
         ros1 |= _ros1_trajectory_parameters(parameters)
     if ros1["type"] == "joint_state_controller/JointStateController":
         ros1.setdefault("publish_rate", JOINT_STATE_RATE)
+        if isinstance(ros1.get("extra_joints"), list):  # ROS 2 has names, ROS 1 mappings
+            ros1["extra_joints"] = [{"name": each} if isinstance(each, str) else each for each in ros1["extra_joints"]]
     return ros1
 
 
