@@ -10,6 +10,20 @@ from launch import LaunchContext
 from launch_ros.actions import Node
 
 QOS = {"Depth": 5, "Durability Policy": "Volatile", "History Policy": "Keep Last", "Reliability Policy": "Reliable"}
+WRITTEN_BY_HAND = """
+Visualization Manager:
+  Displays:
+    - {Class: rviz_default_plugins/LaserScan, Topic: {Value: /scan}}
+    - {Class: rviz_default_plugins/Image, Topic: {Value: /stereo/disparity, Depth: 5}}
+    - {Class: rviz_default_plugins/MarkerArray, Topic: {Depth: 5, Durability Policy: Volatile, Value: /swarm/markers}}
+    - {Class: rviz_default_plugins/PointCloud2, Topic: {Value: /points, Reliability Policy: Best Effort}}
+    - {Class: rviz_default_plugins/Marker, Topic: /marker}
+    - {Class: rviz_default_plugins/Camera, Topic: /camera/image_raw}
+    - {Class: rviz_default_plugins/Path, Topic: /plan, Line Style: {Line Width: 0.1, Value: Lines}}
+    - {Class: rviz_default_plugins/RobotModel, Description Topic: {Value: /robot_description}}
+  Tools:
+    - {Class: rviz_default_plugins/SetGoal, Topic: {Value: /goal_pose}}
+"""
 ORBIT = {"Class": "rviz_default_plugins/Orbit", "Name": "Current View", "Distance": 2.7, "Value": "Orbit (rviz)"}
 DISPLAYS = [
     {"Class": "rviz_default_plugins/Grid", "Name": "Grid", "Plane Cell Count": 10},
@@ -105,6 +119,34 @@ def test_displays_have_the_names_and_properties_of_ros_1(translated: dict[str, A
     shown = [(each["Class"], each.get("Marker Topic", "")) for each in moveit["Displays"]]
     assert ("rviz/RobotModel", "") in shown
     assert ("rviz/MarkerArray", "/move_group/display_planned_path_markers") in shown
+
+
+def test_topics_with_any_settings_and_topics_without_are_names_in_ros_1(source: Path) -> None:
+    source.write_text(WRITTEN_BY_HAND)
+    manager = yaml.safe_load(started_with(source).read_text())["Visualization Manager"]
+    assert manager["Displays"] == [
+        {"Class": "rviz/LaserScan", "Topic": "/scan"},
+        {"Class": "rviz/Image", "Image Topic": "/stereo/disparity"},
+        {"Class": "rviz/MarkerArray", "Marker Topic": "/swarm/markers"},
+        {"Class": "rviz/PointCloud2", "Topic": "/points", "Unreliable": True},
+        {"Class": "rviz/Marker", "Marker Topic": "/marker"},
+        {"Class": "rviz/Camera", "Image Topic": "/camera/image_raw"},
+        {"Class": "rviz/Path", "Topic": "/plan", "Line Style": {"Line Width": 0.1, "Value": "Lines"}},
+        {"Class": "rviz/RobotModel", "Robot Description": "/robot_description"},
+    ]
+    assert manager["Tools"] == [{"Class": "rviz/SetGoal", "Topic": "/goal_pose"}]
+
+
+def test_the_log_names_a_description_file_that_ros_1_does_not_read(
+    source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = "Class: rviz_default_plugins/RobotModel, Name: Arm, Description Topic: {Value: ''}"
+    source.write_text(
+        f"Visualization Manager: {{Displays: [{{{robot}, Description Source: File, Description File: /a.urdf}}]}}"
+    )
+    started_with(source)
+    expected = "display 'Arm' shows the robot of parameter robot_description instead of file '/a.urdf'"
+    assert expected in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_log_names_each_class_that_ros_1_lacks(source: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ import yaml
 from launch.core.screen_log import get_logger
 from launch.ros_packages import package_share_directory, plugin_descriptions
 
+from launch_ros.node_parameters import DESCRIPTION
 from modular_framework_urdf import xml_text
 
 ROS2_PACKAGES = ("rviz_default_plugins", "rviz_common")
@@ -85,6 +86,12 @@ class RvizTranslator:
         for entry in self._entries("display", self._without_moveit(entries), _properties):
             inner = {"Displays": self._displays(entry["Displays"])} if "Displays" in entry else {}
             displays.append(entry | inner)
+            if entry["Class"] == "rviz/RobotModel" and entry.get("Description Source") == "File":
+                parameter = entry.get("Robot Description", DESCRIPTION)
+                self.remarks.append(
+                    f"display '{entry.get('Name', 'RobotModel')}' shows the robot of parameter {parameter} instead of "
+                    f"file '{entry.get('Description File', '')}', because RViz of ROS 1 reads only parameters"
+                )
         return displays
 
     def _without_moveit(self, entries: Any) -> list[Any]:
@@ -136,18 +143,16 @@ def _view(entry: Config) -> Config:
 
 
 def _properties(entry: Config) -> Config:
-    """Converts topics of a display or tool from mappings with quality-of-service settings to names."""
+    """Converts topics of a display or tool to names; in ROS 2, a topic is a name or a mapping with any settings."""
     ros1: Config = {}
     for key, value in entry.items():
-        if isinstance(value, Mapping) and "Value" in value and "Reliability Policy" in value:
-            own = TOPIC_NAMES.get(entry["Class"], key) if key == "Topic" else key
-            ros1[own] = value["Value"]
-            if own in ("Topic", "Image Topic") and value["Reliability Policy"] == "Best Effort":
-                ros1["Unreliable"] = True
-        else:
-            ros1[key] = value
+        own = TOPIC_NAMES.get(entry["Class"], key) if key == "Topic" else key
+        has_settings = str(key).endswith("Topic") and isinstance(value, Mapping) and "Value" in value
+        ros1[own] = value["Value"] if has_settings else value
+        if has_settings and own in ("Topic", "Image Topic") and value.get("Reliability Policy") == "Best Effort":
+            ros1["Unreliable"] = True
     if "Description Topic" in ros1:  # ROS 1 reads the description from a parameter with this name
-        ros1["Robot Description"] = ros1.pop("Description Topic") or "robot_description"
+        ros1["Robot Description"] = ros1.pop("Description Topic") or DESCRIPTION
     if "Interactive Markers Namespace" in ros1:
         ros1["Update Topic"] = f"{str(ros1.pop('Interactive Markers Namespace')).rstrip('/')}/update"
     return ros1
