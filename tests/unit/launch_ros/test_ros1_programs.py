@@ -127,6 +127,14 @@ def test_a_spawner_takes_the_type_in_the_section_of_its_controller(tmp_path: Pat
     assert values["/gripper_action_controller/allow_stalling"] is True
 
 
+def test_a_spawner_takes_the_parameters_of_a_controller_whose_type_is_an_argument(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("arm: {ros__parameters: {joints: [a], command_interfaces: [velocity]}}")
+    arguments = ["arm", "-t", TRAJECTORY, "-p", str(tmp_path / "p.yaml")]
+    values = visited(Node(package="controller_manager", executable="spawner", arguments=arguments)).parameters.values()
+    assert values["/arm/type"] == "velocity_controllers/JointTrajectoryController"
+    assert values["/arm/joints"] == ["a"]
+
+
 @pytest.mark.parametrize("entry", ["front_wheel_joint", "{name: front_wheel_joint}"])
 def test_names_of_extra_joints_are_entries_of_ros_1(tmp_path: Path, entry: str) -> None:
     (tmp_path / "p.yaml").write_text(

@@ -166,10 +166,10 @@ def _spawner(plan: NodePlan) -> NodePlan:
     waiting = given.controller_manager_timeout
     options = ["--namespace", namespace, *(["--timeout", f"{waiting:g}"] if waiting > 0.0 else ["--no-timeout"])]
     files = tuple(ros2_control.source_of(path) for path in given.param_file)
-    parameters = ros2_control.controller_parameters(files)
-    if given.controller_type:
-        for name in given.controller_names:
-            parameters.setdefault(name, {})["type"] = ros2_control.ros1_type(given.controller_type, {})
+    types = dict.fromkeys(given.controller_names, given.controller_type) if given.controller_type else {}
+    parameters = ros2_control.controller_parameters(files, types)
+    for name, type_name in types.items():
+        parameters.setdefault(name, {"type": ros2_control.ros1_type(type_name, {})})
     inactive = given.load_only or given.stopped or given.inactive
     if given.unload_on_kill or given.u:
         executable, command = "spawner", [*options, *(["--stopped"] if inactive else [])]

@@ -134,11 +134,17 @@ def manager_parameters(sources: Sequence[ParameterSource], namespace: str, name:
     return private
 
 
-def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[str, Any]]:
+def controller_parameters(
+    sources: Iterable[ParameterSource], given_types: Mapping[str, str] | None = None
+) -> dict[str, dict[str, Any]]:
     """Returns the controllers with their parameters, converted to ROS 1.
 
     A ROS 2 file lists the controllers and types in the controller manager's section and has a section per controller,
     which may contain the type instead; a ROS 1 file has a mapping with a type per controller.
+
+    Args:
+        sources: Parameter files of the controllers.
+        given_types: Types of controllers with a section, by name; they replace types in the files.
     """
     types: dict[str, str] = {}
     found: dict[str, dict[str, Any]] = {}
@@ -157,6 +163,7 @@ def controller_parameters(sources: Iterable[ParameterSource]) -> dict[str, dict[
                 types.setdefault(name, str(inner["type"]))
             if not own and name not in WILDCARDS:
                 merge(found.setdefault(name, {}), inner)
+    types |= {name: type_name for name, type_name in (given_types or {}).items() if name in found}
     for name, parameters in found.items():
         if name in types and parameters.get("interpolation_method", "splines") != "splines":
             get_logger().warning(
