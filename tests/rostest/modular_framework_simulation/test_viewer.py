@@ -271,6 +271,10 @@ def test_a_browser_on_the_own_page_is_admitted(launch: Any, port: int) -> None:
         connect(own, origin="http://localhost", subprotocols=[PROTOCOL])
 
 
+def test_the_address_is_published_for_a_page_that_embeds_the_viewer(launch: Any) -> None:
+    assert rospy.wait_for_message("/viewer/page_address", String, 20.0).data == address_in(launch.log())
+
+
 def test_a_read_only_page_shows_the_world_and_refuses_to_act_on_it(launch: Any, ros_session: Any) -> None:
     watching = ros_session.launch(READ_ONLY.format(port=free_port()))
     until(lambda: "/ in a browser" in watching.log(), "the address in the log")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Only accepts requests with the viewer's address and token, because any page in a local browser can send requests."""
+"""Only accepts requests with a server's address and token, because any page in a local browser can send requests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import http
 import ipaddress
 import secrets
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from modular_framework_simulation.errors import SimulationError
@@ -20,7 +20,7 @@ _LOCAL_NAMES = ("localhost", _HOSTNAME, f"{_HOSTNAME}.local")
 
 
 class Access:
-    """Checks each HTTP request and WebSocket handshake before viser handles it.
+    """Checks each HTTP request and WebSocket handshake before its server handles it.
 
     Attributes:
         token: First part of every path; secret, and new at each start.
@@ -44,7 +44,7 @@ class Access:
         if origin is not None and origin.lower() != f"http://{host.lower()}":
             return f"Origin '{origin}' is another page; allowed: http://{host}"
         if not secrets.compare_digest(path.split("?")[0].split("/")[1].encode(), self.token.encode()):
-            return "the token is missing or wrong; open the address in the log of the viewer"
+            return "the token is missing or wrong; open the address in the log"
         return ""
 
     @contextlib.contextmanager
@@ -63,8 +63,7 @@ class Access:
 
         def serve(*args: Any, process_request: Any, **options: Any) -> Any:
             started.append(True)
-            process = functools.partial(self._process, process_request)
-            return original(*args, process_request=process, **{**options, **changed})
+            return original(*args, process_request=self.checked(process_request), **{**options, **changed})
 
         server.serve = serve  # type: ignore[assignment, misc]
         try:
@@ -73,6 +72,14 @@ class Access:
             server.serve = original  # type: ignore[misc]
         if not started:
             raise SimulationError("this viser version has an unchecked server; install the version in requirements.txt")
+
+    def checked(self, handler: Callable[..., Any]) -> Callable[..., Any]:
+        """Returns a request handler that refuses requests, and calls another handler for accepted requests.
+
+        Args:
+            handler: The argument `process_request` of `websockets.asyncio.server.serve`.
+        """
+        return functools.partial(self._process, handler)
 
     def _process(self, handler: Any, connection: Any, request: Any) -> Any:
         """Responds to a refused request, and forwards an accepted request without its token."""

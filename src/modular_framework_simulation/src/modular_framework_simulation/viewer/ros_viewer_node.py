@@ -63,6 +63,8 @@ class ViewerNode:
     while shown: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene),
     /move_group/display_planned_path (moveit_msgs/DisplayTrajectory) and an image topic (sensor_msgs/Image).
 
+    Publishes: ~page_address (std_msgs/String, latched), the address with its token, for a page that embeds the viewer.
+
     Services called: see `GazeboCommands`.
 
     Args:
@@ -107,6 +109,8 @@ class ViewerNode:
         Drawing has its own thread that the end of the process interrupts: a large mesh takes seconds on a busy CPU.
         """
         rospy.on_shutdown(self._ended.set)
+        address = rospy.Publisher("~page_address", String, queue_size=1, latch=True)
+        address.publish(String(self._server.address))
         for function in (self._draw_always, self._status.run):
             threading.Thread(target=function, daemon=True).start()
         self._ended.wait()
