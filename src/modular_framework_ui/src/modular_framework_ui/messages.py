@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Messages about a task, as plain values: machines and their active states (smach), reports of the task, log lines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from modular_framework_core.task_constructor.machine_graph import MachineFrame, StateBox, Transition
+
+
+class ReportError(ValueError):
+    """The text of a task report is invalid."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineStructure:
+    """States and transitions of a smach container.
+
+    Attributes:
+        path: Path of the container, such as "/task/Pick".
+        children: Labels of its states, in order.
+        transitions: Transitions; of a concurrence, the entries of the outcome map.
+        outcomes: Outcomes of the container, the last for failure.
+    """
+
+    path: str
+    children: tuple[str, ...]
+    transitions: tuple[Transition, ...]
+    outcomes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineStatus:
+    """Active states of a smach container.
+
+    Attributes:
+        path: Path of the container.
+        initial: Labels of the initial states; several for a concurrence.
+        active: Labels of the running states; empty if the container does not run.
+    """
+
+    path: str
+    initial: tuple[str, ...]
+    active: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskReport:
+    """A message of the topic `task_status`.
+
+    Attributes:
+        task: Name of the task.
+        event: "start" or "end" of a state, "running", or "task_end".
+        state: Path of the state without the task; "" at the end of the task.
+        active: Paths of the running states.
+        elapsed_s: Time since the start of the task [s].
+        state_elapsed_s: Time since the start of the state [s].
+        outcome: Outcome of the state or of the task; "" while running or after an exception.
+        reason: Reason of a failure; "" without a failure.
+        succeeded: Whether the task succeeded; False before its end.
+        feedback: Current activities, keyed by path of the state.
+    """
+
+    task: str
+    event: str
+    state: str
+    active: tuple[str, ...]
+    elapsed_s: float
+    state_elapsed_s: float = 0.0
+    outcome: str = ""
+    reason: str = ""
+    succeeded: bool = False
+    feedback: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def root(self) -> str:
+        """Returns the path of the task's machine."""
+        return f"/{self.task.replace('/', '_')}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogLine:
+    """A line of the ROS log.
+
+    Attributes:
+        time_s: Time of arrival [s].
+        level: "WARN", "ERROR" or "FATAL".
+        node: Name of the node.
+        text: Message of the node.
+    """
+
+    time_s: float
+    level: str
+    node: str
+    text: str
+
+
+def read_report(text: str) -> TaskReport:
+    """Returns a task report.
+
+    Args:
+        text: JSON text of the topic `task_status`.
+
+    Raises:
+        ReportError: The text is not JSON, or a field is missing or has a wrong type.
+    """
+    try:
+        values: dict[str, Any] = json.loads(text)
+        return TaskReport(
+            task=str(values["task"]),
+            event=str(values["event"]),
+            state=str(values["state"]),
+            active=tuple(map(str, values["active"])),
+            elapsed_s=float(values["elapsed_s"]),
+            state_elapsed_s=float(values.get("state_elapsed_s", 0.0)),
+            outcome=str(values.get("outcome") or ""),
+            reason=str(values.get("reason") or ""),
+            succeeded=bool(values.get("succeeded", False)),
+            feedback={str(path): str(activity) for path, activity in values.get("feedback", {}).items()},
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ReportError(
+            f"task_status: invalid report '{text[:80]}' ({type(error).__name__}: {error}); allowed: JSON with "
+            "task, event, state, active and elapsed_s, as run_task publishes"
+        ) from error
+
+
+def machine_frame(
+    root: str, structures: dict[str, MachineStructure], initial: dict[str, tuple[str, ...]]
+) -> MachineFrame:
+    """Returns a machine with its nested machines, for drawing.
+
+    Args:
+        root: Path of the machine.
+        structures: Structures of the containers, keyed by path.
+        initial: Labels of the initial states, keyed by path of the container.
+    """
+    structure = structures[root]
+    children: list[StateBox | MachineFrame] = []
+    for label in structure.children:
+        path = f"{root}/{label}"
+        nested = structures.get(path)
+        children.append(
+            machine_frame(path, structures, initial) if nested and nested.children else StateBox(label=label)
+        )
+    first = tuple(label for label in initial.get(root, ()) if label in structure.children)
+    return MachineFrame(
+        label=root.rpartition("/")[2],
+        outcomes=structure.outcomes,
+        children=tuple(children),
+        initial=first or structure.children[:1],
+        transitions=structure.transitions,
+        is_concurrent=len(first) > 1,
+    )

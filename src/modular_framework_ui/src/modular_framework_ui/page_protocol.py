@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Messages from the server to the page, as JSON; `web/page.js` reads them.
+
+Each message has the changes since the previous message of the connection, and the first message has everything. Times
+are seconds of the server's clock; `now_s` is the time of the message.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from modular_framework_ui.task_state import TaskChanges
+
+
+def changes_text(changes: TaskChanges) -> str:
+    """Returns the message for some changes.
+
+    The keys are those of `TaskChanges`, except `revision`. The values of `runs` and `log` are lists of entries with the
+    additional key `index`.
+    """
+    values: dict[str, Any] = {
+        "now_s": changes.now_s,
+        "task": asdict(changes.task) | {"phase": changes.task.phase.value},
+        "drawing": changes.drawing,
+        "viewer": changes.viewer,
+        "runs": [asdict(run) | {"index": index} for index, run in changes.runs.items()],
+        "oldest_run": changes.oldest_run,
+        "log": [asdict(line) | {"index": index} for index, line in changes.log.items()],
+        "oldest_line": changes.oldest_line,
+    }
+    return json.dumps(values)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Web server of the page: its files over HTTP, and the state of the task over a WebSocket.
+
+A slow browser delays nobody: each connection receives the changes since its own last message, whenever it has sent
+that message, so that changes in between arrive together.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from modular_framework_simulation.viewer.access import Access
+from modular_framework_simulation.viewer.page_connections import PageConnections
+from modular_framework_ui.page_protocol import changes_text
+from modular_framework_ui.task_state import TaskChanges
+
+LIVE_PATH = "/live"
+FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+}
+"""Name and type of each file, keyed by path; no other file is served."""
+MIN_PERIOD_S = 1 / 30
+"""Minimum time between two messages of a connection [s]."""
+MAX_REQUEST_BYTES = 1024
+START_TIMEOUT_S = 10.0
+_READ_ONLY = 1008
+"""Code with which a WebSocket is closed whose page sends something."""
+
+
+class PageServer:
+    """Serves the page in a thread of its own. The page cannot change anything.
+
+    Args:
+        folder: Folder with the files of the page.
+        changes_since: Function that returns the changes after a revision.
+        host: Address of the server.
+        port: Unused port.
+    """
+
+    def __init__(self, folder: Path, changes_since: Callable[[int], TaskChanges], host: str, port: int) -> None:
+        self._files = {path: ((folder / name).read_bytes(), kind) for path, (name, kind) in FILES.items()}
+        self._changes_since = changes_since
+        self.host, self.port = host, port
+        self._access, self._connections = Access(), PageConnections()
+        self._loop = asyncio.new_event_loop()
+        self._changed: set[asyncio.Event] = set()
+        self._started, self._ended = threading.Event(), asyncio.Event()
+        self._fault: OSError | None = None
+        self._thread = threading.Thread(target=self._run, name="page server", daemon=True)
+
+    @property
+    def address(self) -> str:
+        """Returns the URL of the page."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/{self._access.token}/"
+
+    def start(self) -> None:
+        """Starts to serve the page.
+
+        Raises:
+            OSError: The server cannot listen at its address, or does not start in time.
+        """
+        self._thread.start()
+        if not self._started.wait(START_TIMEOUT_S):
+            raise TimeoutError(f"the server does not listen on {self.host}:{self.port} after {START_TIMEOUT_S:g} s")
+        if self._fault is not None:
+            raise self._fault
+
+    def notify(self) -> None:
+        """Has the changes sent to all pages; may be called by any thread, and waits for no page."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._set_changed)
+
+    def close(self) -> None:
+        """Stops the server, whatever the browsers do. May be called twice."""
+        self._connections.close(self._loop)
+        with contextlib.suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._ended.set)
+        if self._thread.is_alive():
+            self._thread.join(START_TIMEOUT_S)
+
+    def _run(self) -> None:
+        try:
+            self._loop.run_until_complete(self._serve())
+        except OSError as error:
+            self._fault = error
+        finally:
+            self._started.set()
+            self._loop.close()
+
+    async def _serve(self) -> None:
+        create_connection: Any = self._connections.create_connection  # serve is annotated with a class, and calls it
+        async with serve(
+            self._send_changes,
+            self.host,
+            self.port,
+            process_request=self._access.checked(self._respond),
+            create_connection=create_connection,
+            max_size=MAX_REQUEST_BYTES,
+        ):
+            self._started.set()
+            await self._ended.wait()
+
+    def _set_changed(self) -> None:
+        for event in self._changed:
+            event.set()
+
+    def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Returns the response to an HTTP request; None for the handshake of the WebSocket."""
+        path = request.path.partition("?")[0]
+        if path == LIVE_PATH:
+            return None
+        if path not in self._files:
+            return connection.respond(http.HTTPStatus.NOT_FOUND, f"there is no file {path}\n")
+        content, kind = self._files[path]
+        headers = {
+            "Content-Type": kind,
+            "Content-Length": str(len(content)),
+            "Content-Security-Policy": _content_policy(request.headers["Host"]),
+            "X-Content-Type-Options": "nosniff",
+            "Cache-Control": "no-store",
+            "Connection": "close",
+        }
+        return Response(200, "OK", Headers(headers), content)
+
+    async def _send_changes(self, connection: ServerConnection) -> None:
+        """Sends the changes until the page goes away."""
+        changed = asyncio.Event()
+        changed.set()
+        self._changed.add(changed)
+        reader = asyncio.create_task(_refuse_messages(connection, changed))
+        try:
+            revision = 0
+            while True:
+                await changed.wait()
+                changed.clear()
+                changes = self._changes_since(revision)
+                revision = changes.revision
+                await connection.send(changes_text(changes))
+                await asyncio.sleep(MIN_PERIOD_S)
+        except ConnectionClosed:
+            pass
+        finally:
+            reader.cancel()
+            self._changed.discard(changed)
+
+
+async def _refuse_messages(connection: ServerConnection, changed: asyncio.Event) -> None:
+    """Closes the connection of a page that sends something.
+
+    Args:
+        connection: Connection of the page.
+        changed: Event that is set at the end of the connection, for which the sender waits.
+    """
+    try:
+        await connection.recv()
+        await connection.close(_READ_ONLY, "the page is read-only")
+    except ConnectionClosed:
+        pass
+    finally:
+        changed.set()
+
+
+def _content_policy(host: str) -> str:
+    """Returns the content security policy: own files only, and frames of this computer for the view of the world."""
+    name = host.rpartition(":")[0]
+    frames = " ".join(f"http://{each}:*" for each in (name, "localhost", "127.0.0.1"))
+    return (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
+        f"connect-src 'self' ws://{host}; frame-src {frames}; frame-ancestors 'none'; base-uri 'none'"
+    )

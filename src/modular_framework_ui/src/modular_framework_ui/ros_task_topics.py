@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Feeds a task model from ROS topics: state machines of any node, reports of run_task, the log, the viewer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rospy
+from rosgraph_msgs.msg import Log
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from std_msgs.msg import String
+
+from modular_framework_core.task_constructor.machine_graph import Transition
+from modular_framework_ui.messages import MachineStatus, MachineStructure, ReportError, read_report
+from modular_framework_ui.task_model import TaskModel
+
+STATUS_TOPIC = "/smach/container_status"
+STRUCTURE_TOPIC = "/smach/container_structure"
+VIEWER_TOPIC = "viewer/page_address"
+LEVELS = {Log.WARN: "WARN", Log.ERROR: "ERROR", Log.FATAL: "FATAL"}
+
+
+class MachineFeed:
+    """Subscriptions to one introspection server.
+
+    Args:
+        server: Prefix of the server's topics.
+        model: Model that receives the messages.
+    """
+
+    def __init__(self, server: str, model: TaskModel) -> None:
+        self._model = model
+        self._roots: set[str] = set()
+        self._was_heard = False
+        self._structures = rospy.Subscriber(server + STRUCTURE_TOPIC, SmachContainerStructure, self._note_structure)
+        self._statuses = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, self._note_status)
+
+    def check(self) -> None:
+        """Tells the model if the server has gone, also if its process was killed."""
+        if self._was_heard and not _is_connected(self._statuses):
+            self._was_heard = False
+            self._note_lost()
+
+    def close(self) -> None:
+        """Ends the subscriptions, and tells the model that the server has gone."""
+        self._structures.unregister()
+        self._statuses.unregister()
+        self._note_lost()
+
+    def _note_lost(self) -> None:
+        for path in self._roots:
+            self._model.note_lost_machine(path)
+
+    def _note_structure(self, message: SmachContainerStructure) -> None:
+        edges = zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to, strict=False)
+        self._model.note_structure(
+            MachineStructure(
+                path=message.path,
+                children=tuple(message.children),
+                transitions=tuple(
+                    Transition(start=start, outcome=name, target=target) for start, name, target in edges
+                ),
+                outcomes=tuple(message.container_outcomes),
+            )
+        )
+
+    def _note_status(self, message: SmachContainerStatus) -> None:
+        if not any(message.path.startswith(f"{root}/") for root in self._roots):
+            self._roots.add(message.path)
+        self._was_heard = True
+        self._model.note_status(
+            MachineStatus(
+                path=message.path,
+                initial=tuple(message.initial_states),
+                active=tuple(label for label in message.active_states if label != "None"),  # public smach, before a run
+            )
+        )
+
+
+class TaskTopics:
+    """All subscriptions of the page.
+
+    Subscribers: ``<node>/smach/container_structure`` and ``<node>/smach/container_status`` (smach_msgs) of all nodes;
+    ``task_status`` (std_msgs/String), reports of run_task; ``/rosout_agg`` (rosgraph_msgs/Log);
+    ``viewer/page_address`` (std_msgs/String), the address of the viewer's page.
+
+    Args:
+        model: Model that receives the messages.
+    """
+
+    def __init__(self, model: TaskModel) -> None:
+        self._model = model
+        self._feeds: dict[str, MachineFeed] = {}
+        self._has_viewer = False
+        self._viewer = rospy.Subscriber(VIEWER_TOPIC, String, self._note_viewer)
+        self._reporting_root = ""
+        self._reports = rospy.Subscriber("task_status", String, self._note_report)
+        self._log = rospy.Subscriber("/rosout_agg", Log, self._note_log)
+
+    def search(self) -> None:
+        """Follows the state machines that appear and disappear. Call the method repeatedly."""
+        published = {
+            name.removesuffix(STATUS_TOPIC)
+            for name, kind in rospy.get_published_topics()
+            if kind == SmachContainerStatus._type and name.endswith(STATUS_TOPIC)
+        }
+        for server in published - self._feeds.keys():
+            self._feeds[server] = MachineFeed(server, self._model)
+        for server in self._feeds.keys() - published:
+            self._feeds.pop(server).close()
+        for feed in self._feeds.values():
+            feed.check()
+        if self._reporting_root and not _is_connected(self._reports):
+            self._model.note_lost_machine(self._reporting_root)
+            self._reporting_root = ""
+        if self._has_viewer and not _is_connected(self._viewer):
+            self._has_viewer = False
+            self._model.note_viewer("")
+
+    def _note_viewer(self, message: String) -> None:
+        self._has_viewer = True
+        self._model.note_viewer(message.data)
+
+    def _note_report(self, message: Any) -> None:
+        try:
+            report = read_report(message.data)
+        except ReportError as error:
+            rospy.logwarn_throttle_identical(10.0, str(error))
+            return
+        self._reporting_root = report.root
+        self._model.note_report(report)
+
+    def _note_log(self, message: Log) -> None:
+        if message.level in LEVELS:
+            self._model.note_log(LEVELS[message.level], message.name, message.msg)
+
+
+def _is_connected(subscriber: rospy.Subscriber) -> bool:
+    """Returns whether a publisher is connected; rospy also counts the connections to publishers that were killed."""
+    return any(link.socket is not None for link in subscriber.impl.connections)

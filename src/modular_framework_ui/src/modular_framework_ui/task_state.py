@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the page shows of a task: the task as a whole, the runs of its states, log lines, and changes of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from modular_framework_ui.messages import LogLine
+
+
+class Phase(Enum):
+    """Phase of a task."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    ENDED = "ended"
+    """The task ended, and its topics do not tell whether it succeeded."""
+    LOST = "lost"
+    """The node of the task ended before the task."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskSummary:
+    """A task as a whole. Times are those of the model's clock.
+
+    Attributes:
+        number: Index of the task, from 1; 0 before the first task.
+        root: Path of its machine; "" before the first task.
+        phase: Phase of the task.
+        start_s: Start time [s].
+        end_s: End time [s]; None before the end.
+        outcome: Outcome; "" before the end or if unknown.
+        reason: Reason of a failure; "" without a failure.
+        feedback: Current activities, keyed by path of the state.
+    """
+
+    number: int = 0
+    root: str = ""
+    phase: Phase = Phase.WAITING
+    start_s: float = 0.0
+    end_s: float | None = None
+    outcome: str = ""
+    reason: str = ""
+    feedback: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateRun:
+    """One execution of a state or of a nested machine.
+
+    Attributes:
+        path: Path of the state, such as "/task/Pick/Close".
+        start_s: Start time [s].
+        end_s: End time [s]; None while running.
+        outcome: Outcome; "" while running or if unknown.
+        reason: Reason of a failure; "" without a failure.
+        has_failed: Whether the state failed.
+        is_machine: Whether the state is a nested machine.
+    """
+
+    path: str
+    start_s: float
+    end_s: float | None = None
+    outcome: str = ""
+    reason: str = ""
+    has_failed: bool = False
+    is_machine: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskChanges:
+    """Everything that changed since a revision of the model.
+
+    Attributes:
+        revision: Current revision.
+        now_s: Current time [s].
+        task: The task as a whole.
+        drawing: SVG of the state machine; None if unchanged.
+        viewer: Address of the page that shows the world; "" if there is none.
+        runs: Changed runs, keyed by index.
+        oldest_run: Index of the oldest run that is kept.
+        log: New log lines, keyed by index.
+        oldest_line: Index of the oldest log line that is kept.
+    """
+
+    revision: int
+    now_s: float
+    task: TaskSummary
+    drawing: str | None
+    viewer: str
+    runs: dict[int, StateRun]
+    oldest_run: int
+    log: dict[int, LogLine]
+    oldest_line: int

@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Shows the state of a task, which the server sends as changes; see page_protocol.py for the messages.
+
+const RETRY_MS = 1000;
+const AXIS_STEPS_S = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
+const MAX_ITEMS = 300; // in a list
+const MARGIN_S = 0.5; // log lines this long before and after a selected state belong to the state
+
+// Browsers draw a frame of another host name in another process, so that the view of the world does not slow the page.
+const OTHER_LOOPBACK_NAMES = { "127.0.0.1": "localhost", localhost: "127.0.0.1" };
+
+const element = (id) => document.getElementById(id);
+
+/** Everything that the server sent; times are seconds of its clock. */
+const state = { task: null, runs: new Map(), log: new Map(), drawing: "", viewer: "", offset_s: 0, selected: null };
+const rows = new Map(); // of the time line, keyed by path of the state
+const bars = new Map(); // keyed by index of the run
+
+function make(kind, className, text) {
+  const made = document.createElement(kind);
+  if (className) made.className = className;
+  if (text !== undefined) made.textContent = text;
+  return made;
+}
+
+const now_s = () => performance.now() / 1000 + state.offset_s;
+const seconds = (value) => `${value.toFixed(1)} s`;
+const sinceStart = (time_s) => time_s - state.task.start_s;
+const shortName = (path) => path.split("/").slice(2).join("/");
+
+function kindOf(run) {
+  if (run.end_s === null) return "active";
+  if (run.has_failed) return "failed";
+  return run.outcome === "" ? "unknown" : "done";
+}
+
+function describe(run) {
+  const name = shortName(run.path);
+  const start = seconds(sinceStart(run.start_s));
+  if (run.end_s === null) return `${name}: running since ${start}`;
+  const outcome = run.outcome === "" ? "ended, outcome unknown" : run.outcome;
+  const reason = run.reason === "" ? "" : `. ${run.reason}`;
+  return `${name}: ${outcome}, ${start} to ${seconds(sinceStart(run.end_s))}${reason}`;
+}
+
+// ---- messages ------------------------------------------------------------------------------------------------------
+function receive(message) {
+  state.offset_s = message.now_s - performance.now() / 1000;
+  const isNewTask = state.task === null || state.task.number !== message.task.number;
+  if (isNewTask) {
+    state.runs.clear();
+    select(null);
+    clearTimeLine();
+  }
+  state.task = message.task;
+  merge(state.runs, message.runs, message.oldest_run);
+  merge(state.log, message.log, message.oldest_line);
+  if (message.drawing !== null) showDrawing(message.drawing);
+  if (message.viewer !== state.viewer) showWorld(message.viewer);
+  showTask();
+  colourGraph(message.runs.some((run) => run.end_s === null));
+  if (isNewTask || message.runs.length > 0) {
+    showTimeLine();
+    showRuns();
+  }
+  if (isNewTask || message.log.length > 0) showLog();
+}
+
+function merge(entries, changed, oldest) {
+  for (const entry of changed) entries.set(entry.index, entry);
+  for (const index of entries.keys()) if (index < oldest) entries.delete(index);
+}
+
+function connect() {
+  const address = new URL("live", location.href);
+  address.protocol = address.protocol.replace("http", "ws");
+  const socket = new WebSocket(address);
+  let isFirst = true;
+  socket.onmessage = (event) => {
+    if (isFirst) { // a server that restarted counts from the beginning
+      isFirst = false;
+      state.task = null;
+      state.log.clear();
+      element("connection").textContent = "";
+    }
+    receive(JSON.parse(event.data));
+  };
+  socket.onclose = () => {
+    element("connection").textContent = "Connection lost. The page shows the last known state.";
+    setTimeout(connect, RETRY_MS);
+  };
+}
+
+// ---- the task as a whole -------------------------------------------------------------------------------------------
+const PHASES = {
+  waiting: "waiting", running: "running", succeeded: "succeeded", failed: "failed", ended: "ended", lost: "lost",
+};
+
+function showTask() {
+  const { task } = state;
+  const name = task.root.replace(/^\//, "") || "No task";
+  element("name").textContent = name;
+  document.title = `${name}: ${task.phase}`;
+  element("phase").textContent = PHASES[task.phase];
+  element("phase").className = `badge ${task.phase}`;
+  setText("sentence", sentence(task));
+  showElapsed();
+}
+
+function setText(id, text) { // a screen reader repeats a text that is set again
+  if (element(id).textContent !== text) element(id).textContent = text;
+}
+
+function sentence(task) {
+  const ending = task.outcome === "" ? "" : ` with outcome '${task.outcome}'`;
+  switch (task.phase) {
+    case "waiting": return "Waiting for a task. The page follows the next task by itself.";
+    case "running": return runningSentence(task);
+    case "succeeded": return `The task succeeded${ending}.`;
+    case "failed": return `The task failed${ending}. ${task.reason}`;
+    case "lost": return task.reason;
+    default: return `The task ended${ending}. Its topics do not tell whether it succeeded.`;
+  }
+}
+
+function runningSentence(task) {
+  const running = [...state.runs.values()].filter((run) => run.end_s === null && !run.is_machine);
+  const names = running.map((run) => {
+    const activity = task.feedback[run.path];
+    return activity ? `${shortName(run.path)} (${activity})` : shortName(run.path);
+  });
+  return names.length === 0 ? "Between two states." : `Running: ${names.join(", ")}.`;
+}
+
+function showElapsed() {
+  const { task } = state;
+  const isStarted = task !== null && task.phase !== "waiting";
+  element("elapsed").textContent = isStarted ? seconds(sinceStart(task.end_s ?? now_s())) : "";
+}
+
+// ---- state machine -------------------------------------------------------------------------------------------------
+function showDrawing(text) {
+  state.drawing = text;
+  const svg = text === "" ? null : new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
+  element("graph").replaceChildren(...(svg === null ? [] : [document.importNode(svg, true)]));
+  for (const title of element("graph").querySelectorAll("title")) title.remove(); // Graphviz' names of nodes
+  for (const link of element("graph").querySelectorAll("a")) link.removeAttributeNS("http://www.w3.org/1999/xlink", "title");
+  for (const node of element("graph").querySelectorAll(".node")) {
+    if (node.id.includes("|") || node.id === "") continue; // outcomes
+    node.setAttribute("tabindex", "0");
+    node.setAttribute("role", "button");
+    node.addEventListener("click", () => selectLast(`/${node.id}`));
+    node.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === " ") { event.preventDefault(); selectLast(`/${node.id}`); }
+    });
+  }
+  fit();
+}
+
+function selectLast(path) {
+  const found = [...state.runs.values()].filter((run) => run.path === path);
+  select(found.length === 0 ? null : found[found.length - 1].index);
+}
+
+function colourGraph(follows) {
+  const last = new Map();
+  const taken = new Set();
+  for (const run of state.runs.values()) {
+    last.set(run.path, run);
+    if (run.outcome !== "") taken.add(`${run.path} ${run.outcome}`);
+  }
+  for (const part of element("graph").querySelectorAll("g[id]")) {
+    if (part.classList.contains("edge")) {
+      part.classList.toggle("taken", taken.has(`/${part.id}`));
+      continue;
+    }
+    const run = last.get(`/${part.id}`);
+    const kind = run === undefined ? "" : kindOf(run);
+    for (const name of ["active", "failed", "done", "unknown"]) part.classList.toggle(name, name === kind);
+    part.classList.toggle("selected", run !== undefined && run.path === state.runs.get(state.selected)?.path);
+    if (part.getAttribute("role") === "button") {
+      part.setAttribute("aria-label", run === undefined ? `${part.id.split("/").pop()}: not run` : describe(run));
+    }
+  }
+  if (follows) scrollToActive();
+}
+
+function scrollToActive() {
+  const box = element("graph").getBoundingClientRect();
+  const active = element("graph").querySelector(".node.active")?.getBoundingClientRect();
+  if (active === undefined || (active.top >= box.top && active.bottom <= box.bottom && active.left >= box.left && active.right <= box.right)) return;
+  element("graph").scrollTop += active.top + active.height / 2 - box.top - box.height / 2;
+  element("graph").scrollLeft += active.left + active.width / 2 - box.left - box.width / 2;
+}
+
+function fit() {
+  element("graph").classList.toggle("fit", element("fit").getAttribute("aria-pressed") === "true");
+}
+
+// ---- world ---------------------------------------------------------------------------------------------------------
+function showWorld(address) {
+  state.viewer = address;
+  element("world-panel").hidden = address === "";
+  const isShown = address !== "" && element("world-switch").getAttribute("aria-pressed") === "true";
+  element("panels").classList.toggle("without-world", address === "");
+  if (!isShown) {
+    element("world").replaceChildren();
+    return;
+  }
+  const url = new URL(address);
+  url.hostname = OTHER_LOOPBACK_NAMES[location.hostname] ?? location.hostname; // the page may be open elsewhere
+  const frame = make("iframe");
+  frame.title = "World";
+  frame.setAttribute("sandbox", "allow-scripts allow-same-origin");
+  frame.src = url.href;
+  element("world").replaceChildren(frame);
+}
+
+// ---- time line -----------------------------------------------------------------------------------------------------
+function clearTimeLine() {
+  rows.clear();
+  bars.clear();
+  element("time").replaceChildren(make("div", "row axis"));
+  element("time").firstChild.append(make("span", "", "Time"), make("div", "bars"));
+  delete element("time").dataset.step;
+}
+
+function rowOf(run) {
+  if (!rows.has(run.path)) {
+    const row = make("div", "row");
+    const label = make("span", "", shortName(run.path));
+    label.title = shortName(run.path);
+    row.append(label, make("div", "bars"));
+    rows.set(run.path, row);
+    element("time").append(row);
+  }
+  rows.get(run.path).classList.toggle("machine", run.is_machine);
+  return rows.get(run.path);
+}
+
+function showTimeLine() {
+  for (const [index, bar] of bars) {
+    if (!state.runs.has(index)) { bar.remove(); bars.delete(index); }
+  }
+  for (const run of state.runs.values()) {
+    if (!bars.has(run.index)) {
+      const bar = make("button", "bar");
+      bar.type = "button";
+      bar.addEventListener("click", () => select(run.index));
+      rowOf(run).lastChild.append(bar);
+      bars.set(run.index, bar);
+    }
+    rowOf(run);
+    const bar = bars.get(run.index);
+    bar.className = `bar ${kindOf(run)}${run.index === state.selected ? " selected" : ""}`;
+    bar.style.setProperty("--start", Math.max(0, sinceStart(run.start_s)));
+    if (run.end_s !== null) bar.style.setProperty("--end", sinceStart(run.end_s));
+    bar.title = describe(run);
+    bar.setAttribute("aria-label", describe(run));
+    bar.textContent = run.has_failed ? "✕" : "";
+  }
+  moveTimeLine();
+}
+
+function moveTimeLine() {
+  if (state.task === null || state.task.phase === "waiting") return;
+  const elapsed_s = Math.max(1, sinceStart(state.task.end_s ?? now_s()));
+  for (const [index, bar] of bars) {
+    if (state.runs.get(index)?.end_s === null) bar.style.setProperty("--end", elapsed_s);
+  }
+  const step_s = AXIS_STEPS_S.find((step) => elapsed_s / step <= 8) ?? Math.ceil(elapsed_s / 8);
+  const total_s = Math.ceil(elapsed_s / step_s) * step_s;
+  const time = element("time");
+  time.style.setProperty("--total", total_s);
+  if (time.dataset.step === `${step_s} ${total_s}`) return;
+  time.dataset.step = `${step_s} ${total_s}`;
+  const marks = [];
+  for (let at_s = 0; at_s < total_s; at_s += step_s) {
+    const mark = make("span", "", `${at_s} s`);
+    mark.style.setProperty("--start", at_s);
+    marks.push(mark);
+  }
+  time.firstChild.lastChild.replaceChildren(...marks);
+}
+
+// ---- lists ---------------------------------------------------------------------------------------------------------
+function showRuns() {
+  const ended = [...state.runs.values()].filter((run) => run.end_s !== null);
+  ended.sort((first, second) => second.end_s - first.end_s || second.index - first.index);
+  const items = ended.slice(0, MAX_ITEMS).map((run) => {
+    const item = make("li", `${kindOf(run)}${run.is_machine ? " machine" : ""}${run.index === state.selected ? " selected" : ""}`);
+    item.append(make("span", "when", seconds(sinceStart(run.end_s))), make("b", "", shortName(run.path)), " ");
+    item.append(make("span", "outcome", run.outcome === "" ? "outcome unknown" : run.outcome));
+    item.append(` after ${seconds(run.end_s - run.start_s)}`);
+    if (run.reason !== "") item.append(make("span", "reason", run.reason));
+    return item;
+  });
+  replaceItems("runs", items, "No state has ended.");
+}
+
+function showLog() {
+  const run = state.runs.get(state.selected);
+  const lines = [...state.log.values()].filter(
+    (line) => run === undefined || (line.time_s >= run.start_s - MARGIN_S && line.time_s <= (run.end_s ?? Infinity) + MARGIN_S),
+  );
+  const items = lines.reverse().slice(0, MAX_ITEMS).map((line) => {
+    const item = make("li", line.level);
+    const isStarted = state.task !== null && state.task.phase !== "waiting";
+    item.append(make("span", "when", isStarted ? seconds(sinceStart(line.time_s)) : ""));
+    item.append(make("span", "level", line.level), " ", make("b", "", line.node), ` ${line.text}`);
+    return item;
+  });
+  replaceItems("log", items, run === undefined ? "No warning and no error." : "No warning and no error at this time.");
+}
+
+function replaceItems(id, items, empty) {
+  element(id).replaceChildren(...(items.length === 0 ? [make("li", "empty", empty)] : items));
+}
+
+// ---- selection -----------------------------------------------------------------------------------------------------
+function select(index) {
+  state.selected = index;
+  const run = state.runs.get(index);
+  element("selected").textContent = run === undefined ? "" : describe(run);
+  element("selected").title = element("selected").textContent;
+  element("deselect").hidden = run === undefined;
+  if (state.task === null) return;
+  colourGraph(false);
+  showTimeLine();
+  showRuns();
+  showLog();
+}
+
+element("deselect").addEventListener("click", () => select(null));
+element("fit").addEventListener("click", () => {
+  const button = element("fit");
+  button.setAttribute("aria-pressed", button.getAttribute("aria-pressed") !== "true");
+  fit();
+  scrollToActive();
+});
+element("world-switch").addEventListener("click", () => {
+  const button = element("world-switch");
+  button.setAttribute("aria-pressed", button.getAttribute("aria-pressed") !== "true");
+  showWorld(state.viewer);
+});
+
+clearTimeLine();
+showWorld("");
+connect();
+setInterval(() => {
+  if (state.task !== null && state.task.phase === "running") { showElapsed(); moveTimeLine(); }
+}, 100);
