@@ -348,6 +348,8 @@ def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixtur
             "2 links have no parent joint (base, alone)",
         ),
         (CRANE.replace('<parent link="boom"', '<parent link="bom"'), (), "link 'bom' is unknown; allowed: base, "),
+        (CRANE.replace('<parent link="turret"', '<parent link="palm"'), (), "closes a loop of links: "),
+        (CRANE.replace('<parent link="base"', '<parent link="palm"'), (), "closes a loop of links: "),
         (CRANE.replace('<axis xyz="0 0 1"', '<axis xyz="0 0 0"'), (), "joint 'pan': its axis is 0 0 0; give it a"),
         ("<robot>", (), "not an XML document"),
     ],

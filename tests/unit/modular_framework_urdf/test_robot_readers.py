@@ -81,6 +81,21 @@ def test_a_fault_of_a_urdf_says_its_line_and_what_is_allowed(found: str, wrong: 
     assert str(caught.value).startswith(fault)
 
 
+def test_links_in_a_loop_are_named_with_the_joint_that_closes_it() -> None:
+    joints = (("a", "base", "l1"), ("b", "l3", "l2"), ("c", "l2", "l3"))
+    text = "".join(f'\n<link name="{name}"/>' for name in ("base", "l1", "l2", "l3"))
+    for name, parent, child in joints:
+        text += f'\n<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+    with pytest.raises(XmlError) as caught:
+        read_urdf(f'<robot name="r">{text}</robot>', "r.urdf")
+    fault, _, remedy = str(caught.value).partition("; ")
+    assert fault in (
+        "r.urdf:7: joint 'b' closes a loop of links: l3 -> l2 -> l3",
+        "r.urdf:8: joint 'c' closes a loop of links: l2 -> l3 -> l2",
+    )
+    assert remedy == "allowed: a tree; correct the parent of one of its joints"
+
+
 SRDF = """<robot name="r"><group name="arm"><!-- a comment --><joint name="b"/><chain base_link="x" tip_link="y"/>
 <joint name="a"/></group><group name="all"><group name="arm"/><link name="tool"/></group>
 <group_state name="home" group="arm"><joint name="b" value="0.5 "/></group_state>

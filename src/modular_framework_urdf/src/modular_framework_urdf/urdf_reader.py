@@ -8,6 +8,8 @@ transmissions.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from graphlib import CycleError, TopologicalSorter
 
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mimics import Mimic
@@ -61,7 +63,7 @@ def read_urdf(text: str | bytes, location: str = "robot_description") -> Robot:
 
     Raises:
         AttributeFault: A number is invalid.
-        XmlError: The text is not well-formed XML, has a DOCTYPE, or contains xacro.
+        XmlError: The text is not well-formed XML, has a DOCTYPE, or contains xacro, or the links form a loop.
     """
     root = xml_text.parse(text, location)
     for element in root.iter():
@@ -69,12 +71,31 @@ def read_urdf(text: str | bytes, location: str = "robot_description") -> Robot:
             raise XmlError(
                 f"{location}:{element.sourceline}", "this is xacro", "allowed: URDF; expand the file with xacro"
             )
+    joints = tuple(_joint(item, location) for item in root.findall("joint"))
+    _refuse_loops(joints, location)
     return Robot(
         root.get("name", ""),
         tuple(_link(item, location) for item in root.findall("link")),
-        tuple(_joint(item, location) for item in root.findall("joint")),
+        joints,
         tuple(map(_transmission, root.findall("transmission"))),
     )
+
+
+def _refuse_loops(joints: Sequence[Joint], location: str) -> None:
+    """Raises an error if a link is above itself."""
+    parents = TopologicalSorter[str]()
+    for joint in joints:
+        parents.add(joint.child, joint.parent)
+    try:
+        parents.prepare()
+    except CycleError as error:
+        loop: list[str] = error.args[1]
+        closing = next(joint for joint in joints if (joint.parent, joint.child) == (loop[0], loop[1]))
+        raise XmlError(
+            f"{location}:{closing.line}",
+            f"joint '{closing.name}' closes a loop of links: {' -> '.join(loop)}",
+            "allowed: a tree; correct the parent of one of its joints",
+        ) from error
 
 
 class _Attributes:
