@@ -85,8 +85,8 @@ class FakeResources:
             raise UnresolvedReference(f"there is no model '{name}'; allowed: {', '.join(SHAPES)}")
         return self._folder / name / "model.sdf"
 
-    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
-        return ("ground_plane", "table")
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
+        return {"ground_plane": (), "table": ("drawer_slide",)}
 
     def package(self, name: str) -> Path:
         if name != "some_moveit_config":

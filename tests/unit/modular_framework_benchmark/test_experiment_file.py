@@ -192,6 +192,10 @@ def test_the_short_form_and_predicates_can_be_mixed(tmp_path: Path) -> None:
         ("{upright: {object: cub_1}}", "cub_1", "object of upright 'cub_1' is unknown; allowed: cube_1, ball_1;"),
         ("{object: cub_1}", "cub_1", "the object of success 'cub_1' is unknown; allowed: cube_1, ball_1; did you mean"),
         ("{in_region: {region: gaol}}", "gaol", "region of in_region 'gaol' is unknown; allowed: goal, away; did you"),
+        ("{joint_at_least: {model: table, joint: slide, position: 1}}", "slide", "the joint of model 'table' in "
+         "joint_at_least 'slide' is unknown; allowed: drawer_slide; did you mean 'drawer_slide'?"),
+        ("{not: {joint_at_least: {model: cube_1, joint: lid, position: 1}}}", "lid", "the joint of model 'cube_1' in "
+         "joint_at_least 'lid' is unknown; "),
         ("{upright: {angel: 0.1}}", "angel", "the key of upright 'angel' is unknown; allowed: duration, object, angle; "
          "did you mean 'angle'?"),
         ("{upright: {angle: 4}}", "4", "angle of upright must be a number from 0 to 3.1416, found the number 4"),

@@ -3,13 +3,19 @@
 
 from __future__ import annotations
 
+import json
 import math
+import time
+from pathlib import Path
 from typing import Any
 
 import pytest
 from predicate_worlds import STANDING_M, sample, stage_of, state
 
+from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.experiments.success_criteria import SuccessCriteria
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.predicates.conditions import (
     Aligned,
     Cleared,
@@ -32,6 +38,7 @@ from modular_framework_benchmark.predicates.predicate import All, Condition, InO
 from modular_framework_benchmark.predicates.predicate import Any as AnyOf
 from modular_framework_benchmark.predicates.progress import Milestone, progress_of
 from modular_framework_benchmark.predicates.stages import OperatorStage, SimulatedStage
+from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
 
 GOAL = Region(name="goal", x=(0.1, 0.3), y=(-0.1, 0.1))
 START = {"table": state((0, 0, 0)), "cube": state((0, 0, STANDING_M)), "lid": state((0.3, 0.2, STANDING_M))}
@@ -198,6 +205,46 @@ def test_a_model_that_is_not_in_the_world_satisfies_nothing() -> None:
     assert not NotMoved(object="cube").truth_over(stage)[-1] and not NoContact(object="cube").truth_over(stage)[-1]
     assert not Untouched(object="cube").truth_over(stage)[-1]
     assert Upright(object="cup").unmet_reasons(stage) == ("there is no 'cup' in the world",)
+
+
+@pytest.mark.parametrize(
+    ("predicate", "text"),
+    [
+        (JointAtLeast(model="bin", joint="lyd", position=0.1), "'bin' has no joint 'lyd'; allowed: lid; did you mean"),
+        (Not(JointAtLeast(model="bin", joint="lyd", position=0.1)), "'bin' has no joint 'lyd'; allowed: lid"),
+        (Not(JointAtLeast(model="cube", joint="lid", position=0.1)), "'cube' has no joint 'lid'"),
+        (Not(Upright(object="cup")), "there is no 'cup' in the world"),
+        (OnTopOf(object="cube", support="tabel"), "there is no 'tabel' in the world"),
+        (JointAtLeast(model="bin", joint="lid", position=0.1), ""),
+        (All((Upright(object="cube"), NoContact(object="cube"), Aligned(object="cube"))), ""),
+    ],
+)
+def test_a_name_that_the_world_never_had_is_found(predicate: Predicate, text: str) -> None:
+    opened = {"bin": state((0, 0, 0), joints={"lid": 0.3})}
+    gone = sample(1.0, {"cube": None})  # a deleted model has existed
+    stage = stage_of(sample(0.0, START | opened, [], []), gone)
+    found = stage.unknown_name_text(predicate.conditions)
+    assert found.startswith(text) and bool(found) == bool(text)
+
+
+@pytest.mark.parametrize("status", [EpisodeStatus.SUCCEEDED, EpisodeStatus.FAILED, EpisodeStatus.TIMED_OUT])
+@pytest.mark.parametrize(("joint", "is_invalid"), [("lyd", True), ("lid", False)])
+def test_an_episode_with_an_unknown_joint_in_a_predicate_is_invalid_and_has_no_progress(
+    status: EpisodeStatus, joint: str, is_invalid: bool, tmp_path: Path
+) -> None:
+    closed = Not(JointAtLeast(model="bin", joint=joint, position=0.1))
+    world = {"samples": [sample(0.0, {"bin": state((0, 0, 0), joints={"lid": 0.3})})], "boxes": {}, "robots": []}
+    (tmp_path / "world.json").write_text(json.dumps(world))
+    for settings in (
+        TaskSettings(success=SuccessCriteria(required=closed), metrics=("success", "progress")),
+        TaskSettings(progress=(Milestone(name="closed", predicate=closed),), metrics=("success", "progress")),
+    ):
+        spec = EpisodeSpec(0, {}, 0, 1, settings)
+        end = EpisodeEnd(spec, tmp_path, time.time(), time.monotonic(), MachineLoad.now())
+        record = make_record(end.with_status(status, "", {"zero": 0.0, "task_started_s": 0.0}))
+        assert record.status is (EpisodeStatus.INVALID if is_invalid else status)
+        assert ("'bin' has no joint 'lyd'; allowed: lid; did you mean 'lid'?" in record.cause) is is_invalid
+        assert not is_invalid or set(record.metrics.values()) == {None}
 
 
 def test_the_task_begins_at_its_last_sample_and_what_was_before_does_not_count() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
 from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.failure_classes import failure_class
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
@@ -95,6 +96,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     answer = end.answer
     joints = read_joints(end.folder)
     stage = read_stage(end.folder, end.answer)
+    end = _with_known_names(end, stage)
     progress = _progress(end, stage)
     measurements = EpisodeMeasurements(
         settings=end.spec.settings,
@@ -138,6 +140,19 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         | ({FAILURE_CLASS: failure.value} if failure is not None else {}),
         folder=str(end.folder),
     )
+
+
+def _with_known_names(end: EpisodeEnd, stage: SimulatedStage | None) -> EpisodeEnd:
+    """Returns the end, which is invalid if a predicate names a model or joint that the world never had."""
+    settings = end.spec.settings
+    is_measured = end.status not in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID)
+    if not is_measured or stage is None or not isinstance(settings, TaskSettings):
+        return end
+    judged = settings.success.predicate(end.target).conditions if settings.success != NO_CRITERIA else ()
+    conditions = (*judged, *(each for milestone in settings.progress for each in milestone.predicate.conditions))
+    text = stage.unknown_name_text(conditions)
+    cause = f"success and progress cannot be judged: {text}"
+    return end.with_status(EpisodeStatus.INVALID, cause, end.answer) if text else end
 
 
 def _progress(end: EpisodeEnd, stage: SimulatedStage | None) -> Progress | None:

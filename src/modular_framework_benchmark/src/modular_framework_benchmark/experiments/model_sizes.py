@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sizes of models: the sides of their boxes, and the height at which they stand on a surface."""
+"""Sizes and joints of models: the sides of their boxes, the height at which they stand on a surface, their joints."""
 
 from __future__ import annotations
 
@@ -91,6 +91,24 @@ def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
         )
     to_model = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0)).inverse()
     return -reach(spec, rotate_vector(to_model.quaternion, (0.0, 0.0, -1.0)))
+
+
+def movable_joints(model: specs.Model) -> tuple[str, ...]:
+    """Returns the names of the joints whose position the simulation records; a static model has none."""
+    recorded = (specs.JointType.REVOLUTE, specs.JointType.CONTINUOUS, specs.JointType.PRISMATIC)
+    return tuple(joint.name for joint in model.joints if joint.kind in recorded and not model.static)
+
+
+def joints_of_file(model: Path) -> tuple[str, ...] | None:
+    """Returns the names of a model's movable joints; None if the file cannot be read.
+
+    Args:
+        model: SDF file of the model.
+    """
+    try:
+        return movable_joints(_read(model))
+    except DescriptionError:
+        return None
 
 
 @lru_cache(maxsize=64)

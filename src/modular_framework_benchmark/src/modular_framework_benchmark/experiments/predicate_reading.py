@@ -16,6 +16,7 @@ from modular_framework_benchmark.predicates.conditions import (
     OLD_ON_TOP_OF,
     ON_TOP_OF,
     Collected,
+    JointAtLeast,
     Region,
     Span,
     Stacked,
@@ -46,12 +47,14 @@ class KnownNames:
 
     Attributes:
         objects: Names of the objects of the experiment, in order.
-        models: Names of all models; None if unknown, so that no name is checked.
+        models: Names of the models of the world; None if unknown, so that no name is checked.
+        joints: Names of the movable joints of models and objects, keyed by model; without entry if unknown.
         regions: Regions by name.
     """
 
     objects: tuple[str, ...] = ()
     models: Collection[str] | None = None
+    joints: Map[str, Collection[str]] = field(default_factory=dict)
     regions: Map[str, Region] = field(default_factory=dict)
 
 
@@ -189,6 +192,12 @@ class PredicateReading:
             text = f"count of collected is {condition.wanted}; allowed: {limit}"
             self.reading.faults.add(node.entries["count"].location, text)
             return None
+        if isinstance(condition, JointAtLeast) and condition.model in self.names.joints:
+            joints = self.names.joints[condition.model]
+            if condition.joint not in joints:
+                what = f"the joint of model '{condition.model}' in {name}"
+                self.reading.faults.add_unknown(node.entries["joint"].location, what, condition.joint, joints)
+                return None
         return condition
 
     def _values(
@@ -218,7 +227,7 @@ class PredicateReading:
                 return self.reading.count(node, what, int(key.low), int(key.high))
             case KeyKind.VECTOR:
                 return self._vector(node, what, key)
-            case KeyKind.NAME:
+            case KeyKind.JOINT:
                 return self.reading.text(node, what)
             case KeyKind.REGION:
                 name = self.reading.choice(node, what, tuple(self.names.regions))

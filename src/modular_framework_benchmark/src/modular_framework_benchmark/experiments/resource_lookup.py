@@ -14,6 +14,10 @@ class UnresolvedReference(Exception):
     """A reference of an experiment file cannot be resolved; the message lists the allowed values."""
 
 
+class UnreadableWorld(UnresolvedReference):
+    """The world of a launch is missing or invalid, so that no episode could start; the message names file and line."""
+
+
 class ResourceLookup(Protocol):
     """Interface of the lookup; `RosResourceLookup` uses the ROS packages."""
 
@@ -65,15 +69,16 @@ class ResourceLookup(Protocol):
             UnresolvedReference: The model does not exist.
         """
 
-    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
-        """Returns the names of the models in the world of a launch.
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
+        """Returns the models in the world of a launch: the names of their movable joints, keyed by model.
 
         Args:
             launch: Launch file with the arguments `description_package` and `world_file`.
             arguments: Arguments of the launch file.
 
         Raises:
-            UnresolvedReference: The world does not exist or is invalid.
+            UnreadableWorld: The world does not exist or is invalid.
+            UnresolvedReference: The launch file names no world.
         """
 
     def package(self, name: str) -> Path:

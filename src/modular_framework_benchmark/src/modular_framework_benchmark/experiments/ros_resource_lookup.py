@@ -11,7 +11,8 @@ import roslaunch.core
 import roslaunch.substitution_args
 import rospkg
 
-from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
+from modular_framework_benchmark.experiments.model_sizes import movable_joints
+from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld, UnresolvedReference
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
 from modular_framework_core.launching.launch_arguments import (
     ArgumentError,
@@ -22,8 +23,8 @@ from modular_framework_core.launching.launch_arguments import (
 from modular_framework_core.launching.launch_values import file_faults
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.models.sdf_reader import read_world
-from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 
 
 class RosResourceLookup:
@@ -103,11 +104,11 @@ class RosResourceLookup:
         model_names = sorted(file.parent.name for file in models.glob("*/model.sdf"))
         raise UnresolvedReference(f"there is no model '{name}'; {listing(model_names)}{nearest(name, model_names)}")
 
-    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
-        """Returns the names of the models in the world of a launch."""
+    def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
+        """Returns the models in the world of a launch with the names of their movable joints."""
         description = self._description(launch, arguments)
         file = self._launch_values(launch, arguments).get("world_file", "")
-        return _models_of(description / "worlds" / file, description / "models") if file else ()
+        return _models_of(description / "worlds" / file, description / "models") if file else {}
 
     def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
         package = self._launch_values(launch, arguments).get("description_package", "")
@@ -125,11 +126,12 @@ class RosResourceLookup:
 
 
 @lru_cache(maxsize=64)
-def _models_of(world: Path, models: Path) -> tuple[str, ...]:
+def _models_of(world: Path, models: Path) -> dict[str, tuple[str, ...]]:
     try:
-        return tuple(model.name for model in read_world(world, Resources((models,), no_packages)).models)
+        content = read_world(world, ros_resources(str(models)))
     except DescriptionError as error:
-        raise UnresolvedReference(f"the world cannot be read: {error}") from error
+        raise UnreadableWorld(f"the world cannot be read: {error}") from error
+    return {model.name: movable_joints(model) for model in content.models}
 
 
 @lru_cache(maxsize=256)

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.mode import Mode, ReadSettings, ros_parameters, setting
+from modular_framework_benchmark.experiments.model_sizes import joints_of_file
 from modular_framework_benchmark.experiments.perturb_reading import read_perturbation
 from modular_framework_benchmark.experiments.predicate_reading import KnownNames, PredicateReading, read_regions
 from modular_framework_benchmark.experiments.reading import Reading
-from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnresolvedReference
+from modular_framework_benchmark.experiments.resource_lookup import DEFAULT_LAUNCH, UnreadableWorld, UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import (
     ObjectNodes,
+    SceneObject,
     perturbed_objects,
     placed_objects,
     read_objects,
@@ -38,6 +40,8 @@ OWN_ARGUMENTS = {
     "seed": "each episode has its own seed, made from the experiment's key seed",
 }
 """Launch arguments that the episodes set themselves, with the alternative for the user."""
+WORLD_ARGUMENTS = ("world_file", "description_package")
+"""Arguments that name the world; the first names its file."""
 FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
 """Arguments that name a file but determine neither the launched nodes nor the robot."""
 
@@ -207,6 +211,7 @@ def _finish(
     task = settings.task
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
+    models = _world_models(read, sound, reading)
     objects = placed_objects(nodes, settings.launch, sound, reading)
     if settings.perturbation is not None:
         location = _location_of(read.node, PERTURBATION)
@@ -216,22 +221,36 @@ def _finish(
     if "objects" in read.unreadable or len(objects) < sum(node.count or 1 for node in nodes):
         names = KnownNames()
     else:
-        names = KnownNames(tuple(item.name for item in objects), _world_models(read, settings.launch, sound, reading))
+        names = _known_names(objects, models)
     settings = replace(settings, arguments=sound if decides else {}, task=task)
     read = _with_predicates(replace(read, settings=settings, objects=tuple(objects)), names, reading)
     return read if decides else replace(read, unreadable=read.unreadable | {"arguments"})
 
 
 def _world_models(
-    read: ReadSettings[TaskSettings], launch: str, arguments: Map[str, str], reading: Reading
-) -> Sequence[str] | None:
-    """Returns the names of the models of the world if predicates need them; None if the world is unknown."""
-    if not {"success", "progress"} & set(read.node.entries):
-        return ()
+    read: ReadSettings[TaskSettings], arguments: Map[str, str], reading: Reading
+) -> Map[str, Sequence[str]] | None:
+    """Returns the models of the world with their joints; None if the world is unknown.
+
+    Adds a fault if the world cannot be read.
+    """
+    if read.settings.arguments.keys() & set(WORLD_ARGUMENTS) - arguments.keys():
+        return None  # the world is not the intended one
     try:
-        return reading.resources.world_models(launch, arguments)
+        return reading.resources.world_models(read.settings.launch, arguments)
+    except UnreadableWorld as error:
+        given = read.node.entries.get("arguments")
+        location = _location_of(given if isinstance(given, Mapping) else read.node, WORLD_ARGUMENTS[0])
+        reading.faults.add(location, str(error))
     except UnresolvedReference:
-        return None
+        pass
+    return None
+
+
+def _known_names(objects: Sequence[SceneObject], models: Map[str, Sequence[str]] | None) -> KnownNames:
+    """Returns the names that predicates may use."""
+    joints = {item.name: found for item in objects if (found := joints_of_file(item.file)) is not None}
+    return KnownNames(tuple(item.name for item in objects), models, {**(models or {}), **joints})
 
 
 def _with_predicates(

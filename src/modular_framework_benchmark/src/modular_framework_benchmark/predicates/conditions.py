@@ -17,6 +17,7 @@ from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.predicate_keys import KeyKind, name, number, vector, whole_number
 from modular_framework_benchmark.predicates.world_track import ROBOT, WORLD, BodyTrack, Flags, Floats, WorldTrack
 from modular_framework_benchmark.records.episode_settings import Tagged
+from modular_framework_ros.allowed_names import listing, nearest
 
 ON_TOP_OF, OLD_ON_TOP_OF = "on_top_of", "on"
 """Name of a predicate, and its old name, which PyYAML reads and writes as true."""
@@ -343,13 +344,22 @@ class JointAtLeast(Condition):
     """
 
     model: str = name(KeyKind.MODEL)
-    joint: str = name(KeyKind.NAME)
+    joint: str = name(KeyKind.JOINT)
     position: float = number(None, low=-1000.0, required=True)
 
     @property
     def statement(self) -> str:
         """Returns a description of the condition."""
         return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
+
+    def unknown_name_text(self, world: WorldTrack) -> str:
+        """Returns that the model or its joint does not exist; "" if both do."""
+        text, joints = Condition.unknown_name_text(self, world), []
+        if not text:
+            joints = list(world.bodies[self.model].joints)
+        if text or self.joint in joints:
+            return text
+        return f"'{self.model}' has no joint '{self.joint}'; {listing(joints)}{nearest(self.joint, joints)}"
 
     def satisfied_in(self, world: WorldTrack) -> Flags:
         """Returns whether the joint is at the position or beyond, shape (n,); never for an unknown joint."""
@@ -358,10 +368,9 @@ class JointAtLeast(Condition):
 
     def measurement_text(self, world: WorldTrack) -> str:
         """Returns the position of the joint, or the joints of the model."""
-        joints = world.bodies[self.model].joints
-        if self.joint not in joints:
-            return f"'{self.model}' has no joint '{self.joint}'; its joints: {', '.join(joints) or 'none'}"
-        found = f"joint '{self.joint}' of '{self.model}' is at {joints[self.joint][-1]:.3f}"
+        if text := self.unknown_name_text(world):
+            return text
+        found = f"joint '{self.joint}' of '{self.model}' is at {world.bodies[self.model].joints[self.joint][-1]:.3f}"
         return f"{found} (wanted: at least {self.position:g})"
 
 

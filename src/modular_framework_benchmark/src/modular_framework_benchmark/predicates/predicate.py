@@ -80,6 +80,11 @@ class Condition(Predicate):
         """Returns the names of the models that the condition is about, in the order of its keys."""
         return model_names(self)
 
+    def unknown_name_text(self, world: WorldTrack) -> str:
+        """Returns which named model, or part of a model, a world has never had; "" if the world knows all names."""
+        missing = [name for name in self.names if name not in world.bodies]
+        return f"there is no '{missing[0]}' in the world" if missing else ""
+
     @property
     @abstractmethod
     def statement(self) -> str:

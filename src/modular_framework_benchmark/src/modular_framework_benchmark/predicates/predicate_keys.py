@@ -20,7 +20,7 @@ class KeyKind(Enum):
     NUMBER = "number"
     COUNT = "count"  # whole number
     VECTOR = "vector"  # three numbers
-    NAME = "name"  # a string that is checked in the episode, such as a joint name
+    JOINT = "joint"  # name of a movable joint of the model
 
 
 @dataclass(frozen=True, slots=True)

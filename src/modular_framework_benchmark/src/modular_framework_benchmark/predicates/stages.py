@@ -35,8 +35,17 @@ class SimulatedStage:
 
     def measurement_text(self, condition: Condition) -> str:
         """Returns the measured value at the last moment."""
-        missing = [name for name in condition.names if name not in self.world.bodies]
-        return f"there is no '{missing[0]}' in the world" if missing else condition.measurement_text(self.world)
+        return condition.unknown_name_text(self.world) or condition.measurement_text(self.world)
+
+    def unknown_name_text(self, conditions: Iterable[Condition]) -> str:
+        """Returns a model or joint of some conditions that the world has never had; "" if all have existed.
+
+        Such a condition does not say anything about a method, neither by itself nor negated.
+
+        Args:
+            conditions: Conditions of the success criteria and milestones.
+        """
+        return next(filter(None, (condition.unknown_name_text(self.world) for condition in conditions)), "")
 
 
 class OperatorStage:

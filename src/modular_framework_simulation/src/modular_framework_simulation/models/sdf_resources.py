@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 from modular_framework_urdf.mesh_paths import PackageFinder
@@ -78,7 +79,13 @@ class Resources:
             looked_in += f" and in {len(candidates) - _MAX_LISTED_FOLDERS} more folders"
         looked_in = looked_in or "no folder, because no model folder is set"
         advice = f"set gazebo_model_path or {MODEL_PATH}"
+        if scheme == "model":
+            advice += nearest(rest.split("/")[0], self._model_names())
         raise DescriptionError(node.location, f"'{uri}' does not exist", f"looked for {looked_in}; {advice}")
+
+    def _model_names(self) -> list[str]:
+        """Returns the names of all models in the search path."""
+        return [path.name for folder in self.model_folders if folder.is_dir() for path in sorted(folder.iterdir())]
 
     def _fuel_candidates(self, address: str) -> list[Path]:
         """Returns the local candidates of a Gazebo Fuel model, which is not downloaded."""
