@@ -117,6 +117,50 @@ def test_the_start_of_the_planning_process_is_no_part_of_the_first_plan(
 
 
 @pytest.mark.parametrize(
+    ("code", "status"),
+    [
+        (ErrorCode.INVALID_GROUP_NAME, EpisodeStatus.BROKEN),
+        (ErrorCode.INVALID_LINK_NAME, EpisodeStatus.BROKEN),
+        (ErrorCode.INVALID_ROBOT_STATE, EpisodeStatus.BROKEN),
+        (ErrorCode.FRAME_TRANSFORM_FAILURE, EpisodeStatus.BROKEN),
+        (ErrorCode.PLANNING_FAILED, EpisodeStatus.FAILED),
+        (ErrorCode.GOAL_IN_COLLISION, EpisodeStatus.FAILED),
+    ],
+)
+def test_an_unknown_name_is_no_failure_of_the_planner(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: ErrorCode, status: EpisodeStatus
+) -> None:
+    class Refusing:
+        def __init__(self, *arguments: object) -> None:
+            """Takes the model and the pipelines, and needs neither."""
+
+        def start(self) -> None:
+            """Has no process."""
+
+        def plan(self, *arguments: object) -> None:
+            raise PlanningError(code, "refused")
+
+        def close(self) -> None:
+            """Has no process."""
+
+    monkeypatch.setattr(ros_planning_runner, "SeededPlanning", Refusing)
+    record = plan(PlanningEpisodeRunner(), problems, tmp_path / "episode")
+    assert record.status is status and code.name in record.cause
+
+
+def test_a_problem_whose_start_names_no_joint_of_the_robot_is_broken(
+    planning: PlanningEpisodeRunner, problems: Path, tmp_path: Path
+) -> None:
+    text = (problems / "request0001.yaml").read_text()
+    assert "panda_joint2" in text
+    (tmp_path / "request0001.yaml").write_text(text.replace("panda_joint2", "panda_joint22", 1))
+    (tmp_path / "scene0001.yaml").write_text((problems / "scene0001.yaml").read_text())
+    record = plan(planning, tmp_path, tmp_path / "episode")
+    assert record.status is EpisodeStatus.BROKEN
+    assert "request0001.yaml: " in record.cause and "did you mean 'panda_joint2'?" in record.cause
+
+
+@pytest.mark.parametrize(
     ("settings", "cause"),
     [
         (

@@ -36,15 +36,24 @@ time_limit: 30
 workers: 2
 """
 
+ROBOT = """<robot name='r'><link name='base'/><link name='tip'/>
+<joint name='pan' type='revolute'><parent link='base'/><child link='tip'/><axis xyz='0 0 1'/>
+<limit lower='-1' upper='1' effort='1' velocity='1'/></joint></robot>
+"""
+REQUEST = """group_name: arm
+start_state: {joint_state: {name: [pan], position: [0.0]}}
+goal_constraints: [{joint_constraints: [{joint_name: pan, position: 0.5}]}]
+"""
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "experiment.yaml").write_text(TEXT)
-    (tmp_path / "robot.urdf").write_text("<robot name='r'><link name='base'/></robot>")
-    (tmp_path / "robot.srdf").write_text("<robot name='r'/>")
+    (tmp_path / "robot.urdf").write_text(ROBOT)
+    (tmp_path / "robot.srdf").write_text("<robot name='r'><group name='arm'><joint name='pan'/></group></robot>")
     (tmp_path / "problems").mkdir()
-    for kind in ("scene", "request"):
-        (tmp_path / "problems" / f"{kind}0001.yaml").write_text("{}")
+    (tmp_path / "problems" / "scene0001.yaml").write_text("world: {collision_objects: []}")
+    (tmp_path / "problems" / "request0001.yaml").write_text(REQUEST)
     return tmp_path
 
 

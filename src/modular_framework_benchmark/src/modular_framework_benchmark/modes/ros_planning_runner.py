@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.problem_sets import Problem
 from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
@@ -25,7 +26,7 @@ from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_p
 from modular_framework_benchmark.modes.ros_robots import digests_of
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.used_software import UsedSoftware
-from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_problems import MotionProblem, read_problem
@@ -38,8 +39,20 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME, Figure
 
 MOTION_PERIOD_S = 0.01
+DEFAULT_TIME_S = 5.0
 CLEARANCE_STATES = 25  # states per motion; the distances of one state take about 0.1 s with detailed meshes
 
+
+BROKEN_CODES = (
+    ErrorCode.CRASH,
+    ErrorCode.INVALID_GROUP_NAME,
+    ErrorCode.INVALID_LINK_NAME,
+    ErrorCode.INVALID_OBJECT_NAME,
+    ErrorCode.INVALID_ROBOT_STATE,
+    ErrorCode.FRAME_TRANSFORM_FAILURE,
+    ErrorCode.UNRECOGNIZED_GOAL_TYPE,
+)
+"""Errors of the problem or its names, which no planner can avoid."""
 
 FULL_SPEED = {"default_velocity_scaling_factor": 1.0, "default_acceleration_scaling_factor": 1.0}
 PLUGINS = {  # defaults for pipelines without a configuration
@@ -142,19 +155,35 @@ def _check_planner(pipeline: PlanningPipeline, planner: str) -> None:
         raise ModeError(f"planner_parameters of '{planner}': {'; '.join(faults)}")
 
 
-def _read_problem(settings: PlanningSettings, model: RobotModel) -> MotionProblem:
-    named = settings.problem
+def load_problem(
+    problem: Problem, model: RobotModel, group: str = "", allowed_time_s: float = DEFAULT_TIME_S
+) -> MotionProblem:
+    """Returns a problem of an experiment.
+
+    Args:
+        problem: Name and files of the problem.
+        model: Robot model.
+        group: Planning group that replaces the group of the request; "" for none.
+        allowed_time_s: Allowed planning time [s].
+
+    Raises:
+        ModeError: A file cannot be read, names what the robot does not have, or asks for more than the mode supports.
+    """
     try:
-        problem = read_problem(model, Path(named.scene), Path(named.request), settings.planning_time)
-    except (PlanningError, KeyError, TypeError, ValueError) as error:
-        raise ModeError(f"{named.request}: cannot be read: {type(error).__name__}: {error}") from error
-    request = replace(
-        problem.request,
-        planner_id=settings.planner,
-        group=settings.group or problem.request.group,
-        attempts=settings.attempts,
-    )
-    return MotionProblem(named.name, request)
+        return read_problem(model, Path(problem.scene), Path(problem.request), allowed_time_s, group)
+    except ModelError as error:
+        raise ModeError(f"problem {problem.name}: {error}") from error
+    except PlanningError as error:
+        raise ModeError(f"problem {problem.name}: {problem.scene}: {error}") from error
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        text = f"{problem.scene} cannot be read: {type(error).__name__}: {error}"
+        raise ModeError(f"problem {problem.name}: {text}") from error
+
+
+def _read_problem(settings: PlanningSettings, model: RobotModel) -> MotionProblem:
+    problem = load_problem(settings.problem, model, settings.group, settings.planning_time)
+    request = replace(problem.request, planner_id=settings.planner, attempts=settings.attempts)
+    return MotionProblem(settings.problem.name, request)
 
 
 def _used_software(statistics: PlanStatistics | None, robot: Robot) -> UsedSoftware:
@@ -168,7 +197,7 @@ def _status(code: ErrorCode) -> EpisodeStatus:
             return EpisodeStatus.SUCCEEDED
         case ErrorCode.TIMED_OUT:
             return EpisodeStatus.TIMED_OUT
-        case ErrorCode.CRASH:
+        case code if code in BROKEN_CODES:
             return EpisodeStatus.BROKEN
         case _:
             return EpisodeStatus.FAILED

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import rospkg
@@ -14,6 +15,7 @@ from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
 from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingFault
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
+from modular_framework_benchmark.experiments.problem_sets import Problem
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
@@ -27,7 +29,7 @@ from modular_framework_benchmark.modes.ros_kinematics_runner import (
 )
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
-from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
+from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner, load_problem
 from modular_framework_benchmark.records.episode_settings import SettingsError, as_json
 from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
@@ -38,9 +40,12 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     ResolvedPlanner,
     UnknownNameError,
 )
+from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
+MAX_PROBLEM_FAULTS = 5
+"""Maximum number of problems whose faults are listed."""
 MOVE_GROUP_NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
 
 
@@ -187,11 +192,33 @@ def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSet
         return CheckedSettings(tuple(faults), None)
     check = _launch_check(robot, settings)
     faults += _parameter_faults(check, settings)
+    if not faults:
+        faults += _problem_faults(read, robot)
     planner = None
     if "planner" not in read.unreadable:
         planner = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
     resolved = as_json(replace(settings, planner=repr(planner)))
     return CheckedSettings(tuple(faults), resolved, _substitutions(check.registry(), planner))
+
+
+def _problem_faults(read: ReadSettings[PlanningSettings], robot: Robot) -> Iterator[SettingFault]:
+    """Yields the errors in the files of the problems; the problems after the first few are counted."""
+    texts = [text for problem in read.problems if (text := _problem_fault(problem, robot.model, read.settings.group))]
+    for text in texts[:MAX_PROBLEM_FAULTS]:
+        yield SettingFault(("problems",), text)
+    if len(texts) > MAX_PROBLEM_FAULTS:
+        text = f"{len(texts) - MAX_PROBLEM_FAULTS} further problems have faults, too; correct these first"
+        yield SettingFault(("problems",), text)
+
+
+@lru_cache(maxsize=4096)
+def _problem_fault(problem: Problem, model: RobotModel, group: str) -> str:
+    """Returns the error in the files of a problem; "" for none. Cached, because levels share their problems."""
+    try:
+        load_problem(problem, model, group)
+    except ModeError as error:
+        return str(error)
+    return ""
 
 
 def _launch_check(robot: Robot, settings: PlanningSettings) -> LaunchCheck:

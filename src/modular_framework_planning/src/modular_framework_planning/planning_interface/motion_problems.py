@@ -14,6 +14,7 @@ import yaml
 from modular_framework_planning.errors import GeometryError, ModelError
 from modular_framework_planning.geometry.shapes import Box, Cylinder, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Transform, make_transform
+from modular_framework_planning.planning_interface.motion_problem_faults import request_faults, scene_faults
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningRequest
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -62,11 +63,29 @@ def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, source_nam
     return scene
 
 
+def _with_state(scene: PlanningScene, state: Mapping[str, Any] | None, source_name: str) -> PlanningScene:
+    """Returns the scene with the robot in a state; joints without a position keep theirs."""
+    joints = (state or {}).get("joint_state") or {}
+    pairs = zip(joints.get("name") or (), joints.get("position") or (), strict=True)
+    values = {name: float(value) for name, value in pairs if name in scene.model.index}
+    return _with_base(scene.with_positions(scene.model.merge(scene.positions, values)), state, source_name)
+
+
 def read_scene(model: RobotModel, path: Path) -> PlanningScene:
-    """Returns the scene of a YAML file; allowed collisions of the robot come from its SRDF."""
+    """Returns the scene of a YAML file; allowed collisions of the robot come from its SRDF.
+
+    Args:
+        model: Robot model.
+        path: Path of the file.
+
+    Raises:
+        ModelError: The file has a key that would be left out, or names a joint that the robot does not have.
+        PlanningError: A shape, a pose or a frame is invalid.
+    """
     content = _load(path)
-    scene = _with_base(empty_scene(model), content.get("robot_state"), path.name)
-    for entry in content["world"]["collision_objects"]:
+    _raise_if_any(path, scene_faults(content, model))
+    scene = _with_state(empty_scene(model), content.get("robot_state"), path.name)
+    for entry in content["world"].get("collision_objects") or ():
         source_name = f"{path.name} '{entry['id']}'"
         poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
         shapes = tuple(
@@ -78,39 +97,55 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
     return scene
 
 
-def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowed_time_s: float) -> MotionProblem:
-    """Returns a problem; joints in the start state that the robot does not have are ignored.
+def read_problem(
+    model: RobotModel, scene_path: Path, request_path: Path, allowed_time_s: float, group: str = ""
+) -> MotionProblem:
+    """Returns a problem.
+
+    Joints without a position in the start state keep their position of the scene, or else 0. The start state may name
+    joints that the robot does not have, such as joints of a gripper, if it has positions of all joints of the group.
 
     Args:
         model: Robot model.
         scene_path: YAML file of the planning scene.
         request_path: YAML file of the planning request.
         allowed_time_s: Allowed planning time [s].
+        group: Planning group that replaces the group of the request; "" for none.
+
+    Raises:
+        ModelError: A file names what the robot does not have, or has a key that would be left out.
+        PlanningError: A shape, a pose or a frame is invalid.
     """
     request = _load(request_path)
-    state = request["start_state"]["joint_state"]
-    values = {
-        name: float(value) for name, value in zip(state["name"], state["position"], strict=True) if name in model.index
-    }
-    scene = read_scene(model, scene_path)
-    scene = scene.with_positions(model.merge(scene.positions, values))
-    scene = _with_base(scene, request["start_state"], request_path.name)
-    goals = tuple(
-        JointGoal({item["joint_name"]: float(item["position"]) for item in goal["joint_constraints"]})
-        for goal in request["goal_constraints"]
-    )
+    _raise_if_any(request_path, request_faults(request, model, group))
+    scene = _with_state(read_scene(model, scene_path), request["start_state"], request_path.name)
+    goals = tuple(_joint_goal(goal["joint_constraints"]) for goal in request["goal_constraints"])
     name = f"{scene_path.parent.name}/{request_path.stem.removeprefix('request')}"
     return MotionProblem(
         name,
         PlanningRequest(
             scene,
-            request["group_name"],
+            group or request["group_name"],
             goals,
             planner_id=request.get("planner_id", ""),
             attempts=1,
             allowed_time_s=allowed_time_s,
         ),
     )
+
+
+def _joint_goal(constraints: Sequence[Mapping[str, Any]]) -> JointGoal:
+    """Returns the goal of some joint constraints with their tolerances."""
+
+    def values(key: str) -> dict[str, float]:
+        return {item["joint_name"]: float(item[key]) for item in constraints if key in item}
+
+    return JointGoal(values("position"), values("tolerance_below"), values("tolerance_above"))
+
+
+def _raise_if_any(path: Path, faults: Sequence[str]) -> None:
+    if faults:
+        raise ModelError(f"{path}: {'; '.join(faults)}")
 
 
 def read_problems(model: RobotModel, folder: Path, allowed_time_s: float) -> Iterator[MotionProblem]:

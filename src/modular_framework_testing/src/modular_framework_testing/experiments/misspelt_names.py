@@ -59,6 +59,24 @@ PLANNING: dict[str, Any] = {
     "compare": "planner",
     "trials": 2,
 }
+ARM = [f"panda_joint{number}" for number in range(1, 8)]
+PROBLEM_SCENE: dict[str, Any] = {
+    "world": {
+        "collision_objects": [
+            {
+                "id": "box",
+                "header": {"frame_id": "panda_link0"},
+                "primitives": [{"type": "box", "dimensions": [0.1, 0.1, 0.1]}],
+                "primitive_poses": [{"position": [0.0, 0.8, 0.5], "orientation": [0.0, 0.0, 0.0, 1.0]}],
+            }
+        ]
+    }
+}
+PROBLEM_REQUEST: dict[str, Any] = {
+    "group_name": "panda_arm",
+    "start_state": {"joint_state": {"name": ARM, "position": [0.0, -0.7, 0.0, -2.3, 0.0, 1.5, 0.7]}},
+    "goal_constraints": [{"joint_constraints": [{"joint_name": name, "position": -0.1} for name in ARM]}],
+}
 KINEMATICS: dict[str, Any] = {
     "experiment": "solvers",
     "mode": "kinematics",
@@ -310,6 +328,68 @@ def in_script(text: str, words: str, state: str = "") -> Case:
     return Case("task script", text.split("\n")[0][:40], refusal_text, words)
 
 
+def in_drawer(success: dict[str, Any], words: str) -> Case:
+    """Returns the case of success criteria about a drawer with the joint `slide`, an object of an experiment.
+
+    Args:
+        success: Wrong success criteria.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        (folder / "drawer").mkdir()
+        (folder / "drawer" / "model.sdf").write_text(DRAWER)
+        drawer = {"model": "drawer/model.sdf", "name": "drawer", "x": 0.5, "y": 0.5, "z": 0.9}
+        return experiment_faults({**TASK, "objects": [*TASK["objects"], drawer], "success": success}, folder)
+
+    return Case("task: success", str(success), refusal_text, words)
+
+
+def in_problem(kind: str, path: tuple[Any, ...], value: Any, words: str) -> Case:
+    """Returns the case of a value in a planning problem.
+
+    Args:
+        kind: File of the problem: `scene` or `request`.
+        path: Keys and indices that lead to the value.
+        value: Wrong value.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        file = folder / PROBLEMS / f"{kind}0001.yaml"
+        file.write_text(yaml.safe_dump(changed_experiment(yaml.safe_load(file.read_text()), path, value)))
+        return experiment_faults({**PLANNING, "group": ""} if path == ("group_name",) else PLANNING, folder)
+
+    return Case(f"{kind} of a problem", f"{'/'.join(map(str, path))}: {value}", refusal_text, words)
+
+
+def in_world(old: str, new: str, words: str) -> Case:
+    """Returns the case of a text in the world of an experiment.
+
+    Args:
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        worlds = Path(rospkg.RosPack().get_path("modular_framework_description")) / "worlds"
+        (folder / "mine.world").write_text(_replace_first((worlds / "ur5_table.world").read_text(), old, new))
+        name = os.path.relpath(folder / "mine.world", worlds)
+        return experiment_faults(changed_experiment(TASK, ("arguments", "world_file"), name), folder)
+
+    return Case("world of an experiment", new, refusal_text, words)
+
+
+DRAWER = """<sdf version="1.6"><model name="drawer">
+<link name="cabinet"><inertial><mass>5</mass></inertial>
+<collision name="c"><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision></link>
+<link name="tray"><inertial><mass>1</mass></inertial>
+<collision name="c"><geometry><box><size>0.05 0.05 0.05</size></box></geometry></collision></link>
+<joint name="slide" type="prismatic"><parent>cabinet</parent><child>tray</child>
+<axis><xyz>1 0 0</xyz><limit><lower>0</lower><upper>0.2</upper></limit></axis></joint>
+</model></sdf>
+"""
 IK = "/robot_description_kinematics"
 LIMITS = "/robot_description_planning/joint_limits"
 OWN_STATE = """import smach
@@ -604,11 +684,58 @@ CASES = [
     in_script(PLANNER_TASK.format("omple/RRT"), "planner 'omple/RRT' is unknown.*did you mean 'ompl/RRT'"),
     in_script(STATE_TASK, "joint state 'stability_pos' is unknown.*did you mean 'stability_pose'"),
     in_script(OWN_TASK.format(name="rospy", option=""), "is the Python module .*choose another name", OWN_STATE),
+    # Planning problems
+    in_problem("request", ("group_name",), "panda_amr", "no planning group 'panda_amr'.*did you mean 'panda_arm'"),
+    in_problem(
+        "request", ("start_state", "joint_state", "name", 1), "panda_joint22", "request0001.yaml: .*mean 'panda_joint2'"
+    ),
+    in_problem(
+        "request",
+        ("start_state", "joint_state"),
+        {"name": [*ARM, "panda_finger_joint11"], "position": [0.0] * 8},
+        "joint 'panda_finger_joint11' is unknown; .*did you mean 'panda_finger_joint1'",
+    ),
+    in_problem(
+        "request",
+        ("goal_constraints", 0, "joint_constraints", 1, "joint_name"),
+        "panda_joint99",
+        "joint 'panda_joint99' is not in group 'panda_arm'; allowed: panda_joint1, .*did you mean 'panda_joint",
+    ),
+    in_problem(
+        "request",
+        ("goal_constraints",),
+        [{"joint_constraints": [], "position_constraints": [{"link_name": "panda_link8"}]}],
+        "position_constraints is not supported.*has no joint_constraints",
+    ),
+    in_problem("request", ("goal_constraints",), [], "goal_constraints is empty"),
+    in_problem(
+        "request",
+        ("path_constraints",),
+        {"orientation_constraints": [{"link_name": "panda_link8"}]},
+        "path_constraints is not supported",
+    ),
+    in_problem("request", ("goal_constraint",), [], "'goal_constraint' is unknown.*did you mean 'goal_constraints'"),
+    in_problem(
+        "request", ("start_state", "joint_state", "position", 0), "left", "position of 'panda_joint1' is 'left'"
+    ),
+    in_problem("scene", ("wrld",), {}, "the key 'wrld' is unknown; .*did you mean 'world'"),
+    in_problem("scene", ("world", "collision_objects", 0, "header"), {"frame_id": "panda_lnk0"}, "mean 'panda_link0'"),
+    in_problem("scene", ("world", "collision_objects", 0, "primitives", 0, "type"), "bxo", "primitive 'bxo'; allowed"),
+    in_problem("scene", ("world", "collision_objects", 0, "meshes"), [{"vertices": []}, 1], "meshes is not supported"),
+    # Predicates and worlds
+    in_drawer(
+        {"not": {"joint_at_least": {"model": "drawer", "joint": "slidr", "position": 0.1}}},
+        "joint of model 'drawer' in joint_at_least 'slidr' is unknown; allowed: slide; did you mean 'slide'",
+    ),
+    in_drawer({"joint_at_least": {"model": "drawer", "joint": "slidr", "position": 0.1}}, "did you mean 'slide'"),
+    in_drawer({"joint_at_least": {"model": "table", "joint": "slide", "position": 0.1}}, "joint of model 'table'"),
+    in_drawer({"not": {"joint_at_least": {"model": "drawr", "joint": "slide", "position": 0.1}}}, "mean 'drawer'"),
+    in_world("model://table", "model://tabel", "mine.world:[0-9]+: .*'model://tabel'.*did you mean 'table'"),
 ]
 
 
 def write_problem(folder: Path) -> None:
-    """Writes an empty planning problem for experiments of mode planning."""
+    """Writes a planning problem for experiments of mode planning."""
     (folder / PROBLEMS).mkdir(exist_ok=True)
-    for kind in ("scene", "request"):
-        (folder / PROBLEMS / f"{kind}0001.yaml").write_text("{}\n")
+    for kind, content in (("scene", PROBLEM_SCENE), ("request", PROBLEM_REQUEST)):
+        (folder / PROBLEMS / f"{kind}0001.yaml").write_text(yaml.safe_dump(content))
