@@ -9,7 +9,7 @@ state that no method wins more pairs than another.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -23,6 +23,7 @@ from modular_framework_benchmark.records.experiment import (
     Metric,
     MetricKind,
 )
+from modular_framework_benchmark.records.perturbation import PERTURBATION, Perturbations
 from modular_framework_benchmark.records.results import ExperimentResults
 
 Floats = NDArray[np.float64]
@@ -98,6 +99,33 @@ def results(world: World, drawn: Draw, **description: object) -> ExperimentResul
         metrics=world.metrics, time_limit_s=LIMIT_S, **description  # type: ignore[arg-type]
     )  # fmt: skip
     return ExperimentResults(described, pd.DataFrame(table), pd.DataFrame(), pairs * methods)
+
+
+def perturbed_results(
+    generator: Generator, perturbations: Perturbations, rate: float, methods: int, scenes: int
+) -> ExperimentResults:
+    """Returns a perturbed experiment whose perturbations have no effect, in the order of the scenes.
+
+    Args:
+        generator: Source of the draws.
+        perturbations: The axes and their levels.
+        rate: True success of every method at every level.
+        methods: Number of methods.
+        scenes: Scenes, which differ in difficulty; each runs at every level.
+    """
+    labels = tuple(each.label for each in perturbations.levels)
+    ease = np.repeat(generator.beta(4 * rate, 4 * (1 - rate), scenes), len(labels))
+    drawn = Draw(
+        generator.random((len(ease), methods)) < ease[:, None],
+        unit=np.repeat(np.arange(scenes), len(labels)),
+        level=np.tile(np.arange(len(labels)), scenes),
+    )
+    found = results(successes(rate, methods), drawn)
+    episodes = found.episodes.assign(
+        trial=found.episodes["seed"], **{PERTURBATION: [labels[int(each)] for each in found.episodes["object"]]}
+    ).drop(columns="object")
+    factors = (found.description.factors[0], Factor(PERTURBATION, labels))
+    return replace(found, description=replace(found.description, factors=factors), episodes=episodes)
 
 
 # --- the truth, by code that shares nothing with the product

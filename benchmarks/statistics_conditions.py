@@ -16,11 +16,19 @@ from scipy import stats
 from simulated_experiments import Draw, Generator, World
 
 from modular_framework_benchmark.records.experiment import Metric
+from modular_framework_benchmark.records.perturbation import (
+    FACTOR,
+    NOMINAL,
+    Perturbations,
+    PerturbedAxis,
+    PerturbedLevel,
+)
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.regression import compare_experiments
 from modular_framework_benchmark.statistics import power, verdicts
 from modular_framework_benchmark.statistics.analysis import compare, summarise, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, Interval, MethodSummary, Verdict
+from modular_framework_benchmark.statistics.robustness import Robustness, analyse_robustness
 from modular_framework_benchmark.statistics.stopping import AnytimeValid
 
 PARTS = 8
@@ -30,6 +38,21 @@ ROW_ERROR = 0.0071
 """Chance that a condition exactly at its bar fails: of 400 experiments at 5 % more than 31."""
 SLACK = 0.004
 """True win differences below this are none: the error of the simulated truth."""
+_AXES = tuple(PerturbedAxis(f"axis_{index}", FACTOR, 0.0) for index in range(5))
+NULL_AXES = Perturbations(
+    _AXES,
+    (
+        PerturbedLevel(NOMINAL, {axis.name: 0.0 for axis in _AXES}),
+        *(
+            PerturbedLevel(f"{axis.name}={value}", {other.name: value if other is axis else 0.0 for other in _AXES})
+            for axis in _AXES
+            for value in (1.0, 2.0)
+        ),
+    ),
+    "one_at_a_time",
+    0.5,
+)
+"""Five axes with two levels each; half of the episodes are wanted to succeed."""
 SHOWN = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
 
 Count = Callable[[Generator], Counter[str]]
@@ -206,6 +229,29 @@ def regression(generator: Generator, world: World, pairs: int, same_seeds: bool)
     return _flag(any(each.comparison.verdict in SHOWN for each in changes))
 
 
+def robustness(generator: Generator, methods: int, scenes: int, step: int) -> Counter[str]:
+    """Counts a perturbed experiment without any effect that shows a fall, or success below the true rate.
+
+    The true success of every method at every level is the wanted success. A fixed experiment is reported repeatedly.
+
+    Args:
+        generator: Source of the draws.
+        methods: Number of methods.
+        scenes: Scenes of the experiment.
+        step: Scenes from one report to the next; the number of scenes for a single report at the end.
+    """
+    whole = simulate.perturbed_results(generator, NULL_AXES, NULL_AXES.wanted_success, methods, scenes)
+    size = len(whole.episodes) // scenes
+    looks = (replace(whole, episodes=whole.episodes.iloc[: look * size]) for look in range(step, scenes + 1, step))
+    return _flag(any(_claims_an_effect(analyse_robustness(look, NULL_AXES)) for look in looks))
+
+
+def _claims_an_effect(found: Robustness) -> bool:
+    falls = [curve.fall.points.interval for curve in found.curves if curve.fall is not None]
+    is_below = any(side.shown_below is not None for curve in found.curves for side in curve.sides)
+    return is_below or any(interval is not None and interval.low > 0.0 for interval in falls)
+
+
 # --- coverage
 
 
@@ -309,9 +355,8 @@ def _claims() -> Iterator[Condition]:
     yield same("two-point, 5 metrics, 50 pairs", claims, world=simulate.shapes("two-point", 5), pairs=50)
     yield same("zero-inflated, 5 metrics, 50 pairs", claims, world=simulate.shapes("zero-inflated", 5), pairs=50)
     yield same("tied counts, 3 methods, 20 pairs", claims, world=simulate.shapes("tied", methods=3), pairs=20)
-    yield same(
-        "equal medians, other shapes, 1 metric, 100 pairs", claims, world=simulate.spreads(1, "median"), pairs=100
-    )
+    yield same("robustness, 4 methods, 5 axes without effect, 20 scenes", robustness, methods=4, scenes=20,
+               step=20)  # fmt: skip
     yield same(
         "equal medians, other shapes, 15 metrics, 100 pairs", claims, world=simulate.spreads(15, "median"), pairs=100
     )
@@ -324,7 +369,8 @@ def _claims() -> Iterator[Condition]:
                world=simulate.times((0.7,) * 3, (5.0,) * 3), pairs=50)  # fmt: skip
     yield same("10 methods, 3 metrics, 10 pairs", claims, world=simulate.shapes("normal", 3, 10), pairs=10)
     yield same("20 problems x 5 seeds, interaction", claims, True, world=simulate.problems(20), pairs=100)
-    yield same("20 problems x 9 seeds, interaction", claims, world=simulate.problems(20), pairs=180)
+    yield same("robustness, 5 axes without effect, reported after every 8 of 40 scenes", robustness, methods=2,
+               scenes=40, step=8)  # fmt: skip
     yield same("6 problems x 10 seeds, interaction", claims, world=simulate.problems(6), pairs=60)
     yield same("20 problems x 5 seeds, skewed interaction", claims, world=simulate.problems(20, True), pairs=100)
     yield same("40 seeds shared by 3 objects", claims, world=simulate.shared_seeds(3), pairs=120)

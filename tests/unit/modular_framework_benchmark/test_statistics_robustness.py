@@ -205,3 +205,69 @@ def test_the_figure_has_the_points_of_each_method_and_the_wanted_success() -> No
     assert list(points[0].y) == [100.0, 90.0, 60.0, 5.0]
     assert drawn.layout.shapes[0].y0 == 50.0
     assert drawn.layout.xaxis.title.text == "perceived pose error [mm]"
+
+
+def robust_sentences(found: ExperimentResults) -> str:
+    return "\n".join(robustness_sentences(analyse_robustness(found, PERTURBATIONS)))
+
+
+def with_statuses(found: ExperimentResults, label: str, status: str, *methods: str) -> ExperimentResults:
+    """Results in which the episodes at a level have this status."""
+    episodes = found.episodes.copy()
+    rows = (episodes["perturbation"] == label) & episodes["method"].isin(methods)
+    episodes.loc[rows, "success"], episodes.loc[rows, "status"] = False, status
+    return dataclasses.replace(found, episodes=episodes)
+
+
+@pytest.mark.parametrize("wanted_success", [0.5, 0.7])
+def test_claims_about_the_wanted_success_hold_jointly_over_methods_and_sides_of_axes(wanted_success: float) -> None:
+    perturbations = dataclasses.replace(PERTURBATIONS, wanted_success=wanted_success)
+    curves = 2 * 3  # two methods; the error has levels on one side, the mass on both sides
+    shown = []
+    for number in range(TRIALS + 1):
+        successes = {"a": counts(20, 20, 20, number, 20, 20), "b": counts(20, 20, 20, 20, 20, 20)}
+        side = side_of(analyse_robustness(results(successes), perturbations), ERROR.name, "a")
+        shown.append(side.shown_below is not None)
+        high = stats.beta.ppf(1 - 0.05 / curves / 2, number + 1, TRIALS - number) if number < TRIALS else 1.0
+        assert shown[-1] == (high < wanted_success)
+    # The true rate of every level is the wanted success, so each claim to be below is false.
+    probability = sum(stats.binom.pmf(number, TRIALS, wanted_success) for number in range(TRIALS + 1) if shown[number])
+    assert 0.0 < 1 - (1 - probability) ** curves <= 0.025
+
+
+def test_an_unfinished_experiment_claims_nothing_about_robustness() -> None:
+    found = results(SOUND)
+    running = dataclasses.replace(found, planned=3 * len(found.episodes))
+    text = robust_sentences(running)
+    assert "shown" not in text
+    assert text.startswith("nothing is claimed about the robustness, because 240 of 720 episodes are finished; ")
+    assert "perceived pose error, a: below 50 % at about 11.8 mm, between 10 mm and 20 mm" in text
+
+
+@pytest.mark.parametrize("kind", ["sequential", "extended"])
+def test_looks_at_the_results_leave_no_claims_about_robustness(kind: str) -> None:
+    found = results(SOUND)
+    description = dataclasses.replace(found.description, **{kind: True})
+    text = robust_sentences(dataclasses.replace(found, description=description))
+    assert text.startswith("nothing is claimed about the robustness, because ")
+    assert "shown" not in text
+
+
+def test_a_level_whose_launches_all_died_is_not_said_to_lower_success() -> None:
+    found = with_statuses(results(SOUND), "object_mass=2", "broken", "a", "b")
+    assert not robust_sentences(found).startswith("perceived pose error and object mass are shown to lower success")
+    side = side_of(analyse_robustness(found, PERTURBATIONS), MASS.name, "a")
+    assert side.values == (1.0, 0.5)
+
+
+def test_nothing_is_said_about_the_robustness_if_no_nominal_episode_measured_a_method() -> None:
+    found = analyse_robustness(with_statuses(results(SOUND), "nominal", "broken", "a", "b"), PERTURBATIONS)
+    assert all(curve.fall is None for curve in found.curves)
+    assert all(side.shown_reached is None for curve in found.curves for side in curve.sides)
+
+
+def test_an_experiment_in_which_every_episode_broke_has_no_sentences_on_robustness() -> None:
+    found = results(SOUND)
+    for each in LEVELS:
+        found = with_statuses(found, each.label, "invalid", "a", "b")
+    assert robust_sentences(found) == ""

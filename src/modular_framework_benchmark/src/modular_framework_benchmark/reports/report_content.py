@@ -40,7 +40,7 @@ from modular_framework_benchmark.reports.success_figures import (
 from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
-from modular_framework_benchmark.statistics.observations import metrics_of
+from modular_framework_benchmark.statistics.observations import metrics_of, unmeasured_reason
 from modular_framework_benchmark.statistics.robustness import Robustness, analyse_robustness
 
 SUCCESS = "success"
@@ -199,7 +199,7 @@ def _robustness(results: ExperimentResults) -> Robustness | None:
     description = results.description
     labels = next((factor.levels for factor in description.factors if factor.name == PERTURBATION), ())
     perturbations = perturbations_of(description.text) if labels else None
-    if perturbations is None:
+    if perturbations is None or unmeasured_reason(results):
         return None
     return analyse_robustness(results, with_run_labels(perturbations, labels))
 

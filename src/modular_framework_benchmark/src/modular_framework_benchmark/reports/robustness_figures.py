@@ -158,6 +158,8 @@ def _falls_sentence(robustness: Robustness) -> str:
         return ""
     falls = enumeration([f"{_fall_text(curve)} for {curve.method}" for curve in curves])
     largest = f"the largest mean fall in success is along {spaced_words(name)}: {falls}"
+    if robustness.no_claims:
+        return f"nothing is claimed about the robustness, because {robustness.no_claims}; {largest}"
     if not robustness.perturbations.one_at_a_time:
         return largest
     shown_axes = [

@@ -41,13 +41,23 @@ def _falls_table(robustness: Robustness) -> Table:
 
 def _notes(robustness: Robustness) -> tuple[str, ...]:
     fit = f"Curve: {robustness.fit}. Levels outside the tested levels are not predicted."
+    claims = (
+        f"Shown to reach or to be below: intervals of {percentage_text(robustness.joint_confidence, 2)} each, so that "
+        f"{percentage_text(robustness.confidence, 0)} hold over all methods and sides of axes."
+    )
+    if robustness.no_claims:
+        claims = f"Nothing is claimed, because {robustness.no_claims}."
     if not robustness.perturbations.one_at_a_time:
-        return (fit, "Fall: success of the best group of levels minus success of the worst group, a description only.")
+        return (
+            fit,
+            claims,
+            "Fall: success of the best group of levels minus success of the worst group, a description only.",
+        )
     fall = (
         "Fall: nominal success minus the lowest success of the tested levels, in the same scenes. Its interval is "
         "corrected for the number of levels and methods; the intervals of single levels are not."
     )
-    return (fit, fall)
+    return (fit, claims, fall)
 
 
 def _levels_table(robustness: Robustness) -> Table:

@@ -3,12 +3,15 @@
 
 A curve is an isotonic regression: success does not rise with the distance from the nominal value. No level outside the
 tested levels is predicted.
+
+Claims follow the rules of the comparisons: no claim before the last episode, after an interim analysis, or about levels
+that measured no method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import takewhile
 
@@ -25,7 +28,7 @@ from modular_framework_benchmark.records.perturbation import (
     PerturbedLevel,
 )
 from modular_framework_benchmark.records.results import ExperimentResults
-from modular_framework_benchmark.statistics.comparison import Estimate, MethodSummary
+from modular_framework_benchmark.statistics.comparison import Estimate, Interval, MethodSummary
 from modular_framework_benchmark.statistics.observations import (
     SUCCESS,
     EpisodeTable,
@@ -33,10 +36,12 @@ from modular_framework_benchmark.statistics.observations import (
     metrics_of,
     other_factors,
     restrict_results,
+    unmeasured_reason,
 )
 from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval
 from modular_framework_benchmark.statistics.summaries import summarise_method
 from modular_framework_benchmark.statistics.values import MIN_UNITS
+from modular_framework_benchmark.statistics.verdicts import is_unfinished
 
 MAX_GROUPS = 5
 """Number of groups into which the points of a space-filling design are divided along an axis."""
@@ -59,8 +64,10 @@ class CurvePoint:
         value: Value of the axis, or the mean of the group, in the unit of the axis.
         low: Smallest value of the group.
         high: Largest value of the group.
-        success: Success of the method.
+        success: Success of the method; without an estimate if the level measured no method.
         progress: Progress of the method; None without milestones.
+        claimed: Interval of the success that holds jointly for all methods and sides of axes; None if nothing may be
+            claimed.
     """
 
     value: float
@@ -68,6 +75,7 @@ class CurvePoint:
     high: float
     success: MethodSummary
     progress: MethodSummary | None
+    claimed: Interval | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,8 +89,8 @@ class FittedSide:
         crossing: Value at which the curve crosses the wanted success, interpolated; None outside the tested levels.
         last_reached: Last value at which the curve reaches the wanted success; None for none.
         first_below: First value at which the curve is below the wanted success; None for none.
-        shown_reached: Last value up to which every interval is at or above the wanted success; None for none.
-        shown_below: First value from which every interval is below the wanted success; None for none.
+        shown_reached: Last value up to which every claimed interval is at or above the wanted success; None for none.
+        shown_below: First value from which every claimed interval is below the wanted success; None for none.
     """
 
     values: tuple[float, ...]
@@ -102,7 +110,8 @@ class Fall:
     Attributes:
         value: Value of the axis with the lowest success, in its unit.
         points: Nominal success minus success at this value, from -1 to 1, as a paired difference. The interval is
-            corrected for the number of tested levels and methods; a space-filling design has none.
+            corrected for the number of tested levels and methods; None for a space-filling design, and if nothing
+            may be claimed.
         pairs: Number of scenes that ran at both levels; 0 for a space-filling design.
     """
 
@@ -138,13 +147,17 @@ class Robustness:
         perturbations: Perturbations of the experiment.
         curves: Curve of each method along each axis.
         order: Names of the axes, the largest mean fall in success first.
-        confidence: Confidence level of each interval.
+        confidence: Confidence level of the interval of a single level.
+        joint_confidence: Confidence level of each claimed interval; jointly they hold at the level `confidence`.
+        no_claims: Reason why nothing is claimed; "" if claims are possible.
     """
 
     perturbations: Perturbations
     curves: tuple[RobustnessCurve, ...]
     order: tuple[str, ...]
     confidence: float
+    joint_confidence: float
+    no_claims: str
 
     @property
     def fit(self) -> str:
@@ -175,7 +188,8 @@ def analyse_robustness(results: ExperimentResults, perturbations: Perturbations)
     """
     analysis = _Analysis(results, perturbations)
     curves = tuple(curve for axis in perturbations.axes for curve in analysis.curves(axis))
-    return Robustness(perturbations, curves, _order(curves), results.description.confidence)
+    confidence = results.description.confidence
+    return Robustness(perturbations, curves, _order(curves), confidence, analysis.joint_confidence, analysis.no_claims)
 
 
 class _Analysis:
@@ -184,6 +198,9 @@ class _Analysis:
     def __init__(self, results: ExperimentResults, perturbations: Perturbations) -> None:
         self._results, self._perturbations = results, perturbations
         self._progress = next((item for item in metrics_of(results) if item.kind is MetricKind.PARTIAL_CREDIT), None)
+        self.no_claims = _reason_for_no_claims(results)
+        claims = len(methods_of(results)) * sum(_side_count(axis, perturbations) for axis in perturbations.axes)
+        self.joint_confidence = 1 - (1 - results.description.confidence) / max(claims, 1)
 
     def curves(self, axis: PerturbedAxis) -> list[RobustnessCurve]:
         """Returns the curve of each method along an axis."""
@@ -198,12 +215,17 @@ class _Analysis:
         return curves
 
     def _point(self, group: _Group, table: EpisodeTable, method: str) -> CurvePoint:
+        success = summarise_method(table, SUCCESS, method)
+        joint = summarise_method(table, SUCCESS, method, self.joint_confidence).estimate
+        progress = None if self._progress is None else summarise_method(table, self._progress, method)
+        is_measured = not unmeasured_reason(table.results)
         return CurvePoint(
             value=float(np.mean(group.values)),
             low=group.values[0],
             high=group.values[-1],
-            success=summarise_method(table, SUCCESS, method),
-            progress=None if self._progress is None else summarise_method(table, self._progress, method),
+            success=success if is_measured else replace(success, estimate=None),
+            progress=progress if is_measured or progress is None else replace(progress, mean=None),
+            claimed=joint.interval if joint and is_measured and not self.no_claims else None,
         )
 
     def _fall(
@@ -221,11 +243,11 @@ class _Analysis:
             highest = max(rate for rate, _, _ in known)
             return Fall(value=value, points=Estimate("difference of groups", highest - lowest, None), pairs=0)
         outcomes = self._paired_outcomes(method, group.labels[0])
-        if outcomes is None:
+        if outcomes is None or not any(point.value == axis.nominal and point.success.estimate for point in points):
             return None
         description = self._results.description
         tested = (len(self._perturbations.levels) - 1) * len(methods_of(self._results))
-        is_valid = outcomes.pairs >= MIN_UNITS and not description.holds_at_any_time
+        is_valid = outcomes.pairs >= MIN_UNITS and not self.no_claims
         interval = paired_interval(outcomes, 1 - (1 - description.confidence) / tested) if is_valid else None
         estimate = Estimate("paired difference", outcomes.difference, interval)
         return Fall(value=value, points=estimate, pairs=outcomes.pairs)
@@ -241,6 +263,24 @@ class _Analysis:
             return None
         won, lost = pairs["nominal"] & ~pairs["perturbed"], ~pairs["nominal"] & pairs["perturbed"]
         return PairOutcomes(int(won.sum()), int(lost.sum()), len(pairs))
+
+
+def _reason_for_no_claims(results: ExperimentResults) -> str:
+    """Returns the reason why nothing may be claimed about the robustness, otherwise ""."""
+    description = results.description
+    if description.sequential:
+        return "a stopping rule looked at the results"
+    if description.extended:
+        return "episodes were added after results had been seen"
+    if is_unfinished(results):
+        return f"{len(results.episodes)} of {results.planned} episodes are finished"
+    return unmeasured_reason(results)
+
+
+def _side_count(axis: PerturbedAxis, perturbations: Perturbations) -> int:
+    """Returns the number of sides of the nominal value of an axis with tested levels."""
+    values = [float(np.mean(group.values)) for group in _groups(axis, perturbations)]
+    return any(value > axis.nominal for value in values) + any(value < axis.nominal for value in values)
 
 
 def _groups(axis: PerturbedAxis, perturbations: Perturbations) -> list[_Group]:
@@ -265,19 +305,22 @@ def _perturbs_only(level: PerturbedLevel, axis: PerturbedAxis, perturbations: Pe
 
 
 def _sides(axis: PerturbedAxis, points: Sequence[CurvePoint], wanted_success: float) -> tuple[FittedSide, ...]:
-    known_points = [point for point in points if point.success.estimate is not None]
-    above = [point for point in known_points if point.value >= axis.nominal]
-    below = [point for point in reversed(known_points) if point.value <= axis.nominal]
+    above = [point for point in points if point.value >= axis.nominal]
+    below = [point for point in reversed(points) if point.value <= axis.nominal]
     return tuple(
-        _side(side, wanted_success) for side in (below, above) if any(point.value != axis.nominal for point in side)
+        _side(side, wanted_success)
+        for side in (below, above)
+        if any(point.value != axis.nominal and point.success.estimate is not None for point in side)
     )
 
 
 def _side(points: Sequence[CurvePoint], wanted_success: float) -> FittedSide:
     """Returns the fit of points in the order of their distance from the nominal value."""
-    estimates = [point.success.estimate for point in points if point.success.estimate is not None]
-    rates = fitted_rates([estimate.value for estimate in estimates], [point.success.counts.counted for point in points])
-    values = [point.value for point in points]
+    known = [(point, point.success.estimate) for point in points if point.success.estimate is not None]
+    rates = fitted_rates(
+        [estimate.value for _, estimate in known], [point.success.counts.counted for point, _ in known]
+    )
+    values = [point.value for point, _ in known]
     below = [index for index, rate in enumerate(rates) if rate < wanted_success]
     first = below[0] if below else None
     kind, crossing = CrossingKind.NOT_REACHED, None
@@ -287,12 +330,10 @@ def _side(points: Sequence[CurvePoint], wanted_success: float) -> FittedSide:
         kind = CrossingKind.WITHIN
         fraction = (rates[first - 1] - wanted_success) / (rates[first - 1] - rates[first])
         crossing = values[first - 1] + fraction * (values[first] - values[first - 1])
-    intervals = [estimate.interval for estimate in estimates]
-    # Both claims go through the levels in order, and need no correction for their number: each level is a condition.
-    reached_count = sum(1 for _ in takewhile(lambda estimate: estimate and estimate.low >= wanted_success, intervals))
-    below_count = sum(
-        1 for _ in takewhile(lambda estimate: estimate and estimate.high < wanted_success, reversed(intervals))
-    )
+    # Both claims go through the levels in order and end at the first level that does not confirm them, so the number of
+    # levels needs no correction. The claimed intervals are corrected for the number of methods and sides.
+    reached = list(takewhile(lambda point: point.claimed and point.claimed.low >= wanted_success, points))
+    shown_below = list(takewhile(lambda point: point.claimed and point.claimed.high < wanted_success, reversed(points)))
     return FittedSide(
         values=tuple(values),
         rates=rates,
@@ -300,8 +341,8 @@ def _side(points: Sequence[CurvePoint], wanted_success: float) -> FittedSide:
         crossing=crossing,
         last_reached=values[-1] if first is None else values[first - 1] if first else None,
         first_below=None if first is None else values[first],
-        shown_reached=values[reached_count - 1] if reached_count else None,
-        shown_below=values[-below_count] if below_count else None,
+        shown_reached=reached[-1].value if reached else None,
+        shown_below=shown_below[-1].value if shown_below else None,
     )
 
 

@@ -21,16 +21,20 @@ from modular_framework_benchmark.statistics.values import (
 )
 
 
-def summarise_method(table: EpisodeTable, metric: Metric, method: str) -> MethodSummary:
+def summarise_method(
+    table: EpisodeTable, metric: Metric, method: str, confidence: float | None = None
+) -> MethodSummary:
     """Returns the summary of a metric for a method.
 
     Args:
         table: Finished episodes.
         metric: Metric to summarise.
         method: Level of the compared factor.
+        confidence: Confidence level of the intervals; None for that of the experiment.
     """
     observed = table.observations(metric, method)
-    counts, confidence = table.counts(metric, method), table.results.description.confidence
+    counts = table.counts(metric, method)
+    confidence = table.results.description.confidence if confidence is None else confidence
     present = observed.at_rows(np.flatnonzero(~np.isnan(observed.scores)))
     is_rate = metric.kind is MetricKind.RATE
     estimate = mean = quartiles = None
