@@ -348,7 +348,7 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
     own = experiment.description.metrics[1]
     assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
-    assert experiment.metric_specs == ("success", OwnMetric("swing", f"{tmp_path / 'mine.py'}:swing"))
+    assert experiment.metric_specs == ("success", OwnMetric("swing", f"{tmp_path / 'mine.py'}:swing", lowest=0.0))
     assert (
         "'swng' is unknown; allowed: swing, two; did you mean 'swing'"
         in faults_of(PICK.replace("[success, task_time]", "[mine.py:swng]"), tmp_path)[0]
@@ -383,6 +383,43 @@ def test_a_metric_of_ones_own_may_be_a_count_and_have_bounds(tmp_path: Path) -> 
     entry = "{function: mine.py:grips, kind: count, lowest: 1, highest: 4}"
     own = read(PICK.replace("task_time]", f"{entry}]"), tmp_path).description.metrics[1]
     assert (own.kind, own.bounds) == (MetricKind.COUNT, (1.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("entry", "fault"),
+    [
+        ("{metric: success, limit: 3}", "'success' is a rate, which has no limit; remove limit"),
+        ("{function: mine.py:f, kind: rate, limit: 1}", "'f' is a rate, which has no limit; remove limit"),
+        ("{function: mine.py:f, kind: partial_credit, limit: 0.5}", "'f' is a partial credit, which has no limit"),
+        ("{function: mine.py:f, kind: partial_credit, better: lower}", "better must be higher for partial credit"),
+        (
+            "{function: mine.py:f, lowest: 5, highest: 1}",
+            "highest must be a number above the smallest value, 5, found 1",
+        ),
+        ("{function: mine.py:f, kind: count, highest: 0}", "highest must be a number above the smallest value, 0"),
+        (
+            "{function: mine.py:f, lowest: 0, highest: 1, limit: 2}",
+            "limit must be in the range of 'f', 0 to 1, found 2",
+        ),
+    ],
+)
+def test_a_limit_or_bound_that_the_statistics_cannot_use_is_a_fault(tmp_path: Path, entry: str, fault: str) -> None:
+    (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
+    (found,) = faults_of(PICK.replace("[success, task_time]", f"[task_time, {entry}]"), tmp_path)
+    assert fault in found
+
+
+def test_the_episodes_know_the_allowed_values_of_a_metric_of_ones_own(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
+    specs = {
+        kind: read(PICK.replace("task_time]", f"{{function: mine.py:f, kind: {kind}}}]"), tmp_path).metric_specs[1]
+        for kind in ("value", "count", "rate", "partial_credit")
+    }
+    allowed = {kind: (spec.is_rate, spec.lowest, spec.highest) for kind, spec in specs.items()}
+    assert allowed["value"] == (False, None, None)
+    assert allowed["count"] == (False, 0.0, None)
+    assert allowed["rate"][0]
+    assert allowed["partial_credit"] == (False, 0.0, 1.0)
 
 
 def test_a_sequential_rule_is_read(tmp_path: Path) -> None:

@@ -221,3 +221,28 @@ def test_a_value_that_is_no_number_is_a_fault(tmp_path: Path) -> None:
     file.write_text("def text(episode):\n    return 'much'\n")
     assert "ValueError" in measure([OwnMetric("text", f"{file}:text")], episode()).faults["text"]
     assert math.isfinite(measure(["lift"], episode()).values["lift"] or math.nan)
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "fault"),
+    [
+        ({"lowest": 0.0, "highest": 1.0}, 87.0, "the value is 87; allowed: 0 to 1"),
+        ({"lowest": 0.0}, -1.0, "the value is -1; allowed: 0 to inf"),
+        ({"is_rate": True}, 0.5, "the value of the rate is 0.5; allowed: 0 or 1"),
+    ],
+)
+def test_a_value_outside_the_bounds_of_a_users_metric_is_a_fault(
+    tmp_path: Path, metric: dict[str, float], value: float, fault: str
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(f"def mine(episode):\n    return {value}\n")
+    measured = measure([OwnMetric("mine", f"{file}:mine", **metric)], episode())  # type: ignore[arg-type]
+    assert measured.values == {"mine": None}
+    assert fault in measured.faults["mine"]
+
+
+def test_rounding_at_a_bound_of_a_users_metric_is_corrected(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def mine(episode):\n    return 1.0 + 2.0**-52\n")
+    measured = measure([OwnMetric("mine", f"{file}:mine", lowest=0.0, highest=1.0)], episode())
+    assert (measured.values, measured.faults) == ({"mine": 1.0}, {})

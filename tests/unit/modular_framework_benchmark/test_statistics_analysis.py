@@ -375,6 +375,16 @@ def test_a_mean_difference_has_an_interval_only_on_request_and_only_with_bounds(
     assert found is not None and found.interval is None
 
 
+def test_values_outside_their_bounds_have_no_interval_of_the_mean_difference() -> None:
+    metric = Metric("mine", "own", MetricKind.VALUE, Direction.HIGHER, lowest=0.0, highest=1.0)
+    values = {"mine": {"a": [0.5] * 11 + [40.0], "b": [0.25] * 12}}
+    found = compare(
+        results_of({"a": outcomes([True] * 12), "b": outcomes([True] * 12)}, [metric], values), mean_intervals=True
+    )
+    difference = found[1].mean_difference
+    assert difference is not None and difference.interval is None
+
+
 def test_many_comparisons_are_corrected_together() -> None:
     results = results_of({name: outcomes([1] * 12 + [int(name == "A")] * 8) for name in "ABCD"})
     found = {(each.first, each.second): each for each in compare(results)}

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import math
+from collections.abc import Iterator
 from collections.abc import Mapping as Map
 from pathlib import Path
 
@@ -89,7 +91,27 @@ def _known_with_limit(
     limit = reading.number(node.entries["limit"], "limit", 0.0) if "limit" in node.entries else None
     if metric_and_spec is None or limit is None:
         return metric_and_spec
-    return dataclasses.replace(metric_and_spec[0], limit=limit), metric_and_spec[1]
+    metric = dataclasses.replace(metric_and_spec[0], limit=limit)
+    if fault := _limit_fault(metric):
+        reading.faults.add(node.entries["limit"].location, fault)
+    return metric, metric_and_spec[1]
+
+
+def _limit_fault(metric: Metric) -> str:
+    """Returns the fault of the limit of a metric, otherwise ""."""
+    if metric.limit is None:
+        return ""
+    if metric.is_fraction:
+        return f"'{metric.name}' is a {_kind_words(metric.kind)}, which has no limit; remove limit"
+    low, high = dataclasses.replace(metric, limit=None).bounds
+    if low <= metric.limit <= high:
+        return ""
+    return f"limit must be in the range of '{metric.name}', {low:g} to {high:g}, found {metric.limit:g}"
+
+
+def _kind_words(kind: MetricKind) -> str:
+    """Returns the kind of a metric in words."""
+    return kind.value.replace("_", " ")
 
 
 def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | None:
@@ -120,7 +142,28 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | 
         name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit=limit,
         description=text("description", ""), lowest=lowest, highest=highest,
     )  # fmt: skip
-    return metric, OwnMetric(name, f"{path}:{function}")
+    for key, fault in _own_faults(metric):
+        reading.faults.add(node.entries.get(key, item).location, fault)
+    low, high = dataclasses.replace(metric, limit=None).bounds
+    spec = OwnMetric(
+        name,
+        f"{path}:{function}",
+        is_rate=metric.kind is MetricKind.RATE,
+        lowest=low if math.isfinite(low) else None,
+        highest=high if math.isfinite(high) else None,
+    )
+    return metric, spec
+
+
+def _own_faults(metric: Metric) -> Iterator[tuple[str, str]]:
+    """Yields the key and the fault of each inconsistent setting of a user's metric."""
+    if fault := _limit_fault(metric):
+        yield "limit", fault
+    if metric.kind is MetricKind.PARTIAL_CREDIT and metric.better is Direction.LOWER:
+        yield "better", "better must be higher for partial credit: an episode without a value counts as 0, the worst"
+    low, high = dataclasses.replace(metric, limit=None).bounds
+    if low >= high:
+        yield "highest", f"highest must be a number above the smallest value, {low:g}, found {high:g}"
 
 
 def _choice(node: Mapping, key: str, allowed: list[str], default: str, reading: Reading) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,13 @@ from types import ModuleType
 
 from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
-from modular_framework_benchmark.records.episode_settings import MetricSpec
+from modular_framework_benchmark.records.episode_settings import MetricSpec, OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock, Source
+
+ROUNDING = 1e-9
+"""Relative and absolute rounding error with which a value may exceed a bound."""
 
 MetricFunction = Callable[[EpisodeMeasurements], float | None]
 """Function that returns the value of a metric for an episode, or None without a value."""
@@ -193,6 +197,26 @@ class MeasuredMetrics:
     faults: Mapping[str, str]
 
 
+def _allowed_value(value: float, metric: OwnMetric) -> float:
+    """Returns a value of a user's metric, corrected for rounding at a bound.
+
+    Raises:
+        ValueError: The value is not an allowed value of the metric.
+    """
+    if metric.is_rate and value in (0.0, 1.0) or math.isnan(value):
+        return value
+    if metric.is_rate:
+        raise ValueError(
+            f"the value of the rate is {value:g}; allowed: 0 or 1; correct the function, or use kind: value"
+        )
+    low = -math.inf if metric.lowest is None else metric.lowest
+    high = math.inf if metric.highest is None else metric.highest
+    allowed = min(max(value, low), high)
+    if not math.isclose(value, allowed, rel_tol=ROUNDING, abs_tol=ROUNDING):
+        raise ValueError(f"the value is {value:g}; allowed: {low:g} to {high:g}; correct the function or the bounds")
+    return allowed
+
+
 def measure(specs: Iterable[MetricSpec], episode: EpisodeMeasurements) -> MeasuredMetrics:
     """Returns the metrics of an episode.
 
@@ -212,7 +236,8 @@ def measure(specs: Iterable[MetricSpec], episode: EpisodeMeasurements) -> Measur
             name, function = entry.name, load_metric(entry.function)
         try:
             value = function(episode)
-            values[name] = None if value is None else float(value)
+            number = None if value is None else float(value)
+            values[name] = number if number is None or isinstance(entry, str) else _allowed_value(number, entry)
         except Exception as error:  # user code may raise anything, which must not break the episode
             values[name], faults[name] = None, f"{type(error).__name__}: {error}"
     return MeasuredMetrics(values, faults)

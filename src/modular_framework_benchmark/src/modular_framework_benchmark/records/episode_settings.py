@@ -63,10 +63,16 @@ class OwnMetric:
     Attributes:
         name: Name of the metric.
         function: FILE.py:NAME of the function that measures it, with an absolute path.
+        is_rate: Whether the value must be 0 or 1.
+        lowest: Smallest allowed value; None for no bound.
+        highest: Largest allowed value; None for no bound.
     """
 
     name: str
     function: str
+    is_rate: bool = False
+    lowest: float | None = None
+    highest: float | None = None
 
 
 MetricSpec = str | OwnMetric

@@ -152,9 +152,11 @@ def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Esti
     if metric.kind is MetricKind.RATE or not is_known.any():
         return None
     means, _ = unit_means(differences[is_known], _coarser_units(matched)[is_known])
-    bounds_width = metric.bounds[1] - metric.bounds[0]
-    interval = None
+    low, high = metric.bounds
+    bounds_width, interval = high - low, None
+    known = np.concatenate([matched.first.values[is_known], matched.second.values[is_known]])
+    is_bounded = math.isfinite(bounds_width) and low <= known.min() and known.max() <= high
     is_wanted = settings.mean_intervals or metric.kind is MetricKind.PARTIAL_CREDIT
-    if is_wanted and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
+    if is_wanted and is_bounded and len(means) >= MIN_UNITS:
         interval = sequential.anytime_interval(means, settings.confidence, bounds_width)
     return Estimate("mean difference", float(np.mean(means)), interval)
