@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-STATUSES = ("succeeded", "failed", "timed_out", "broken")
+STATUSES = ("succeeded", "failed", "timed_out", "broken", "invalid")
 
 
 def claims_of(page: str) -> dict[str, Any]:

@@ -214,17 +214,19 @@ def test_missing_values_are_left_out_and_counted() -> None:
     assert "2 pairs left out because an episode has no value" in found.notes
 
 
-def test_broken_episodes_count_as_failures_and_what_they_decide_is_told() -> None:
-    statuses = {"A": ["succeeded"] * 20, "B": ["succeeded"] * 12 + ["broken"] * 8}
+@pytest.mark.parametrize("status", ["broken", "invalid"])
+def test_unmeasured_episodes_count_as_failures_and_what_they_decide_is_told(status: str) -> None:
+    statuses = {"A": ["succeeded"] * 20, "B": ["succeeded"] * 12 + [status] * 8}
     (found,) = compare(results_of(statuses))
     assert found.verdict is Verdict.FIRST_BETTER
     assert found.verdict_without_broken is Verdict.NOT_SHOWN
     assert found.notes == (
-        "8 broken episodes counted as failures; without their pairs the verdict changes "
+        "8 broken or invalid episodes counted as failures; without their pairs the verdict changes "
         "(0 points, 95 % interval -30 to 30, 12 paired episodes)",
     )
     of_b = next(each for each in summarise(results_of(statuses)) if each.method == "B")
-    assert of_b.counts.broken == 8
+    assert (of_b.counts.broken + of_b.counts.invalid, of_b.counts.failed) == (8, 0)
+    assert f"8 {status}" in of_b.sentence
     assert of_b.estimate is not None
     assert of_b.estimate.value == 0.6
 

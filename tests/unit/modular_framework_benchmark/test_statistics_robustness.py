@@ -271,3 +271,12 @@ def test_an_experiment_in_which_every_episode_broke_has_no_sentences_on_robustne
     for each in LEVELS:
         found = with_statuses(found, each.label, "invalid", "a", "b")
     assert robust_sentences(found) == ""
+
+
+def test_a_level_at_which_episodes_of_one_method_broke_is_named_below_the_falls() -> None:
+    found = with_statuses(results(SOUND), "object_mass=2", "invalid", "a")
+    assert robust_sentences(found).splitlines()[1] == (
+        "broken or invalid episodes, counted as failures: object mass 2, a: 20 of 20"
+    )
+    both = with_statuses(results(SOUND), "object_mass=2", "broken", "a", "b")
+    assert robust_sentences(both).splitlines()[1].endswith("b: 20 of 20 (no method was measured; excluded)")

@@ -18,7 +18,7 @@ from modular_framework_benchmark.records.results import COLD_START, ExperimentRe
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
-from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of
+from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of, unmeasured_reason
 
 SIDE_FACTOR = "side"
 AFTER, BEFORE = "after", "before"
@@ -94,9 +94,12 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
     """Returns the changes between two experiments.
 
     Raises:
-        ReportError: The experiments differ in their factors, or share no method or no metric.
+        ReportError: The experiments differ in their factors, share no method or no metric, or one measured no method.
     """
     _check_factors(before.description, after.description)
+    for side, results in (("earlier", before), ("later", after)):
+        if reason := unmeasured_reason(results):
+            raise ReportError(f"{side} experiment {results.description.name}: {reason}")
     methods, levels_notes = _common_names(_levels(before.description), _levels(after.description), "method")
     metrics, metric_notes = _common_metrics(before, after)
     confidence = before.description.confidence

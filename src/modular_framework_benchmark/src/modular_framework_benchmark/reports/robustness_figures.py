@@ -32,6 +32,8 @@ from modular_framework_benchmark.statistics.robustness import (
 from modular_framework_benchmark.statistics.sentences import enumeration
 
 FIGURE_PREFIX = "robustness_"
+MAX_BROKEN_LEVELS = 4
+"""Number of levels with broken or invalid episodes that a sentence names."""
 CURVE_OFFSET = 0.008
 """Distance between the points of two methods at one level, as a fraction of the tested range."""
 
@@ -141,7 +143,7 @@ def side_text(side: FittedSide, axis: PerturbedAxis, wanted_success: float) -> s
 def robustness_sentences(robustness: Robustness) -> tuple[str, ...]:
     """Returns the falls along the axes, and for each curve the level at which it falls below the wanted success."""
     wanted_success = robustness.perturbations.wanted_success
-    lines = [_falls_sentence(robustness)]
+    lines = [_falls_sentence(robustness), _broken_sentence(robustness)]
     for name in robustness.order:
         for curve in robustness.of_axis(name):
             side_texts = [side_text(side, curve.axis, wanted_success) for side in curve.sides]
@@ -167,6 +169,24 @@ def _falls_sentence(robustness: Robustness) -> str:
     ]
     verb = "are" if len(shown_axes) > 1 else "is"
     return f"{enumeration(shown_axes) if shown_axes else 'no axis'} {verb} shown to lower success; {largest}"
+
+
+def _broken_sentence(robustness: Robustness) -> str:
+    """Returns the levels with broken or invalid episodes, whose number may explain a fall."""
+    counts: dict[str, None] = {}
+    for curve in robustness.curves:
+        for point in curve.points:
+            broken = point.success.counts.broken + point.success.counts.invalid
+            if broken:
+                level = value_text(point.value, curve.axis)
+                where = "nominal" if point.value == curve.axis.nominal else f"{spaced_words(curve.axis.name)} {level}"
+                excluded = "" if point.success.estimate else " (no method was measured; excluded)"
+                counts[f"{where}, {curve.method}: {broken} of {point.success.counts.episodes}{excluded}"] = None
+    is_measured = any(point.success.estimate for curve in robustness.curves for point in curve.points)
+    if not counts or not is_measured:
+        return ""
+    more = f"; {len(counts) - MAX_BROKEN_LEVELS} more" if len(counts) > MAX_BROKEN_LEVELS else ""
+    return f"broken or invalid episodes, counted as failures: {'; '.join(list(counts)[:MAX_BROKEN_LEVELS])}{more}"
 
 
 def _is_shown(curve: RobustnessCurve) -> bool:

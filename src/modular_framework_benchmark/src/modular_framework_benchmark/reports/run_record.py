@@ -11,6 +11,7 @@ from pathlib import PurePath
 from typing import Any
 
 from modular_framework_benchmark.experiments.design import DRAWN_SETTINGS
+from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.level_digests import all_digests, combination_key, digests_of
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.records.snapshot_parts import REFERENCE, PartKind, kind_of
@@ -85,10 +86,16 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, str]]:
         yield name, ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
+_UNMEASURED_CAUSES = {
+    EpisodeStatus.BROKEN: "the launch died or the measurement failed",
+    EpisodeStatus.INVALID: "the world or the judgement was changed from outside, or another planner ran",
+}
+
+
 def warnings_of(
     results: ExperimentResults, snapshots: SnapshotValues, combinations: CombinationSnapshots
 ) -> tuple[str, ...]:
-    """Returns the warnings of a report: unfinished or broken episodes, faults, inconsistent software.
+    """Returns the warnings of a report: unfinished, broken or invalid episodes, faults, inconsistent software.
 
     Args:
         results: Finished episodes.
@@ -102,14 +109,16 @@ def warnings_of(
             f"{len(episodes):,} of {count_phrase(results.planned, 'planned episode')} are finished; "
             "figures cover these."
         )
-    broken = episodes[episodes["status"] == "broken"]
-    if len(broken):
-        numbers = ", ".join(str(number) for number in broken["number"].head(12))
-        more = f" and {len(broken) - 12:,} more" if len(broken) > 12 else ""
-        verb = "is" if len(broken) == 1 else "are"
+    for status, cause in _UNMEASURED_CAUSES.items():
+        ended = episodes[episodes["status"] == status.value]
+        if ended.empty:
+            continue
+        numbers = ", ".join(str(number) for number in ended["number"].head(12))
+        more = f" and {len(ended) - 12:,} more" if len(ended) > 12 else ""
+        verb = "is" if len(ended) == 1 else "are"
         warnings.append(
-            f"{count_phrase(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
-            f"{numbers}{more}). They count as failures; the comparisons name the conclusions that depend on them."
+            f"{count_phrase(len(ended), 'episode')} {verb} {status.value}: {cause} (number {numbers}{more}). They "
+            "count as failures; the comparisons name the conclusions that depend on them."
         )
     return (*warnings, *_inconsistent(combinations), *_incidents(snapshots), *_load_warning(results, snapshots))
 

@@ -398,7 +398,7 @@ def missing_table(content: ReportContent) -> Table:
 
 def status_table(content: ReportContent) -> Table:
     """Returns the numbers of each method's episodes by final status."""
-    columns = ("method", "episodes", "succeeded", "failed", "timed out", "broken")
+    columns = ("method", "episodes", "succeeded", "failed", "timed out", "broken", "invalid")
     names = [column.replace(" ", "_") for column in columns[1:]]
     rows = tuple(
         (Cell(item.method), *number_cells(*(count_text(getattr(item.counts, name)) for name in names)))

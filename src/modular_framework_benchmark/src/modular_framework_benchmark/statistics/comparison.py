@@ -66,6 +66,7 @@ class EpisodeCounts:
         timed_out: Episodes that exceeded the time limit.
         broken: Episodes whose launch died or whose measurement failed. Rates and metrics with a limit count them as
             failures.
+        invalid: Episodes whose world or judgement was changed from outside; they count as failures.
         counted: Episodes with a value of the metric, including censored ones.
         censored: Episodes that count at the metric's limit.
         missing: Episodes without a value, excluded from all figures.
@@ -77,6 +78,7 @@ class EpisodeCounts:
     failed: int
     timed_out: int
     broken: int
+    invalid: int
     counted: int
     censored: int
     missing: int
@@ -125,7 +127,7 @@ class PairCounts:
         won: Pairs in which the first method is better.
         lost: Pairs in which the second method is better.
         failed: Compared episodes that rank worse than any value.
-        broken: Compared episodes that are broken.
+        broken: Compared episodes that are broken or invalid.
         missing: Pairs excluded because an episode has no value of the metric.
         unlike: Pairs excluded from a real or processor time because only one episode is the first of its stack.
         unmatched: Finished episodes without a finished or planned partner.
@@ -193,7 +195,8 @@ class Comparison(PairFigures):
         p_corrected: P value after the multiplicity correction; None without data.
         correction: Description of the correction, such as `Holm and Tarone; the least p value counts 6 times`.
         verdict: Conclusion; a difference requires both the corrected p value and the interval.
-        verdict_without_broken: Verdict without the pairs of broken episodes; None without such pairs.
+        verdict_without_broken: Verdict without the pairs of broken or invalid episodes;
+            None without such pairs.
         pairs_needed: Total number of pairs that shows `difference_planned` with 80 % power; None if the sample is large
             enough or the number is unknown.
         difference_planned: Win difference that `pairs_needed` refers to.

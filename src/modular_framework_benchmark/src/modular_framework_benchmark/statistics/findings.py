@@ -28,7 +28,7 @@ class Finding(PairFigures):
         discordance: Mean square of the units' win differences; with one pair per unit it is the fraction of discordant
             pairs. The sample size depends on it. None without data.
         min_attainable_p: Minimum attainable p value with this number of discordant units; 0 for an anytime-valid test.
-        without_broken: Comparison that excludes pairs with a broken episode; None if no episode is broken.
+        without_broken: Comparison that excludes pairs with a broken or invalid episode; None without such pairs.
     """
 
     metric: Metric

@@ -3,11 +3,12 @@
 
 This module defines the value of an episode that failed, timed out, broke or lacks a value:
 
-- Success: every episode that does not succeed is a failure, including broken ones.
+- Success: every episode that does not succeed is a failure, including broken and invalid ones.
 - Other metrics except rates and partial credit: an unsuccessful episode ranks worse than any value if the metric
   describes the whole task (outside the mode `task`, for every metric) or if the episode has no value. Its value in a
   mean is the metric's limit, if there is one. Values beyond the limit also count at the limit.
-- Partial credit: every episode has its own value; an episode without one, such as a broken episode, counts as 0.
+- Partial credit: every episode has its own value; an episode without one, such as a broken or invalid episode, counts
+  as 0.
 - Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
   Missing values are excluded from the figures and counted.
 
@@ -49,7 +50,7 @@ class Observations:
         values: Values for means, NaN if there is none, shape (n,).
         scores: Values for ranks: infinitely bad for failures, NaN if missing, shape (n,).
         censored: Whether each value counts at the limit, shape (n,).
-        broken: Whether each episode is broken, shape (n,).
+        broken: Whether each episode is broken or invalid, shape (n,).
         units: Index of each episode's independent unit, shape (n,).
     """
 
@@ -89,7 +90,7 @@ class Pairs:
 
     @property
     def broken(self) -> Flags:
-        """Returns whether either episode of each pair is broken, shape (n,)."""
+        """Returns whether either episode of each pair is broken or invalid, shape (n,)."""
         return np.asarray(self.first.broken | self.second.broken)
 
     def select(self, mask: Flags) -> Pairs:
@@ -173,7 +174,7 @@ class EpisodeTable:
         episodes = results.episodes
         self._succeeded = episodes["success"].to_numpy(bool)
         self._statuses = episodes["status"].to_numpy()
-        self._broken = np.asarray(self._statuses == EpisodeStatus.BROKEN.value, dtype=bool)
+        self._broken = np.isin(self._statuses, [status.value for status in UNMEASURED_STATUSES])
         first_of_stack = episodes[COLD_START] if COLD_START in episodes else np.zeros(len(episodes), dtype=bool)
         self._first_of_stack = np.asarray(first_of_stack, dtype=bool)
         self._strata = _strata(results)
@@ -203,9 +204,10 @@ class EpisodeTable:
         return EpisodeCounts(
             episodes=len(statuses),
             succeeded=count_status(EpisodeStatus.SUCCEEDED),
-            failed=count_status(EpisodeStatus.FAILED) + count_status(EpisodeStatus.INVALID),
+            failed=count_status(EpisodeStatus.FAILED),
             timed_out=count_status(EpisodeStatus.TIMED_OUT),
             broken=count_status(EpisodeStatus.BROKEN),
+            invalid=count_status(EpisodeStatus.INVALID),
             counted=int(present.sum()),
             censored=int(observed.censored.sum()),
             missing=int((~present).sum()),

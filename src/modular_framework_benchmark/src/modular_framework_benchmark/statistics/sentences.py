@@ -196,6 +196,7 @@ def _remarks(counts: EpisodeCounts) -> str:
     parts = [
         f"{counts.missing} without a value" if counts.missing else "",
         f"{counts.broken} broken" if counts.broken else "",
+        f"{counts.invalid} invalid" if counts.invalid else "",
     ]
     return "".join(f", {part}" for part in parts if part)
 

@@ -27,7 +27,7 @@ class Correction:
 
     Attributes:
         p_value: Corrected p value; None without a test.
-        p_without_broken: Corrected p value without the pairs of broken episodes.
+        p_without_broken: Corrected p value without the pairs of broken or invalid episodes.
         error_rate: Error rate of the experiment.
         strictest_level: Level of the strictest Holm step.
     """
@@ -191,4 +191,5 @@ def _broken_note(finding: Finding, verdicts: tuple[Verdict, Verdict | None]) -> 
         return ""
     effect = "the verdict is the same" if verdicts[0] is verdicts[1] else "the verdict changes"
     text = f" ({sentences.comparison_figures_text(without.metric, without)})" if without.difference else ""
-    return f"{sentences.quantity_text(count, 'broken episode')} counted as failures; without their pairs {effect}{text}"
+    episodes = sentences.quantity_text(count, "broken or invalid episode")
+    return f"{episodes} counted as failures; without their pairs {effect}{text}"
