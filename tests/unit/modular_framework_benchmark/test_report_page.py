@@ -20,6 +20,7 @@ from modular_framework_benchmark.commands.report_command import main
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode
 from modular_framework_benchmark.reports.time_figures import timelines_figure
+from modular_framework_benchmark.results.database import open_database
 
 HOSTILE = (
     "<script>document.documentElement.dataset.hacked = 1</script>",
@@ -180,8 +181,31 @@ def test_the_report_shows_how_many_episodes_of_each_method_reached_each_mileston
         reached = [
             sum(span.name == name and not span.failed for each in records for span in each.spans) for name in MILESTONES
         ]
-        assert list(trace["x"]) == list(MILESTONES) and list(trace["customdata"]) == reached
+        assert list(trace["x"]) == list(MILESTONES)
+        assert [list(each) for each in trace["customdata"]] == [[number, len(records)] for number in reached]
         assert list(trace["y"]) == pytest.approx([100.0 * number / len(records) for number in reached])
+
+
+def test_a_milestone_counts_only_the_episodes_whose_levels_have_it(tmp_path: Path) -> None:
+    experiment = replace(SMALL, with_progress=True)
+    first, *later = MILESTONES
+    database = tmp_path / "results.db"
+    records = [
+        replace(record, spans=tuple(span for span in record.spans if span.name not in later))
+        if record.spec.configuration["object"] == experiment.objects[0]
+        else record
+        for record in experiment.records()
+    ]
+    records[-1] = replace(records[-1], status=EpisodeStatus.BROKEN, spans=())  # without a record, at the second level
+    with open_database(database, create=True) as opened:
+        number = opened.add_experiment(experiment.description(), experiment.specs())
+        for record in records:
+            opened.write(number, record)
+    figure = Page.of(database, tmp_path / "report.html").figures()["milestones"]
+    for trace in figure["data"]:
+        of_method = [each for each in records if each.spec.configuration["motion_planner"] == trace["name"]]
+        of_level = [each for each in of_method if each.spec.configuration["object"] == experiment.objects[1]]
+        assert [total for _, total in trace["customdata"]] == [len(of_method), *[len(of_level)] * len(later)]
 
 
 def test_an_experiment_without_milestones_has_no_figure_of_them(page: Page) -> None:

@@ -30,7 +30,13 @@ from modular_framework_benchmark.reports.run_record import (
     recorded_values,
     warnings_of,
 )
-from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary, choose_episodes, summarise_spans
+from modular_framework_benchmark.reports.span_tables import (
+    ChosenEpisode,
+    SpanSummary,
+    choose_episodes,
+    milestone_episodes,
+    summarise_spans,
+)
 from modular_framework_benchmark.reports.success_figures import (
     differences_figure,
     levels_figure,
@@ -59,6 +65,7 @@ class ReportSource:
         snapshots: Distinct values of each snapshot part with their numbers of episodes.
         combinations: The same by combination of levels.
         span_totals: Sums of all spans for `summarise_spans`.
+        milestone_levels: Combinations of levels at which episodes have each milestone, keyed by milestone.
         spans_of: Function that reads the spans of the episodes with the given numbers.
     """
 
@@ -68,6 +75,7 @@ class ReportSource:
     snapshots: SnapshotValues
     combinations: CombinationSnapshots
     span_totals: pd.DataFrame
+    milestone_levels: Mapping[str, Sequence[Mapping[str, str]]]
     spans_of: Callable[[Sequence[int]], pd.DataFrame]
 
 
@@ -165,9 +173,8 @@ def gather_content(results: ExperimentResults, source: ReportSource, mean_interv
     recorded = recorded_values(source.snapshots)
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods
-    episodes = {item.method: item.counts.episodes for item in analysis.summaries if item.metric == SUCCESS}
     figures = _comparison_figures(results, analysis) + _existing_figures(
-        milestones_figure(spans, {name: count for name, count in episodes.items() if count}),
+        milestones_figure(spans, milestone_episodes(results, source.milestone_levels)),
         *(robustness_figures(robustness) if robustness is not None else ()),
         components_figure(spans, methods),
         levels_figure(levels, methods),

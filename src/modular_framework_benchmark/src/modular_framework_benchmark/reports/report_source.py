@@ -59,6 +59,7 @@ class OpenedExperiment:
             self.snapshots,
             self.combinations,
             self.database.span_totals(self.number),
+            self.database.milestone_levels(self.number),
             lambda episodes: self.database.spans(self.number, episodes),
         )
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pandas as pd
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.failure_groups import Link, episode_links
-from modular_framework_benchmark.statistics.observations import methods_of
+from modular_framework_benchmark.statistics.observations import methods_of, other_factors
 
 MAX_TIMELINES = 12
 
@@ -128,6 +129,34 @@ def summarise_spans(
         if row["method"] in episodes.index
     ]
     return tuple(sorted(summaries, key=lambda item: _sort_key(item, order, methods)))
+
+
+def milestone_episodes(
+    results: ExperimentResults, levels: Mapping[str, Sequence[Mapping[str, str]]]
+) -> dict[str, dict[str, int]]:
+    """Returns the number of finished episodes of each method that have each milestone, keyed by method and milestone.
+
+    An episode without a record, such as a broken episode, has the milestones of the other episodes at its levels.
+
+    Args:
+        results: Finished episodes.
+        levels: Combinations of levels at which episodes have each milestone, keyed by milestone.
+    """
+    compared, names = results.description.compared, [factor.name for factor in other_factors(results)]
+    rows = results.episodes[[compared, *names]].astype(str).itertuples(index=False, name=None)
+    counts = Counter((method, others) for method, *others_of_row in rows for others in [tuple(others_of_row)])
+    with_milestone = {
+        milestone: {tuple(combination[name] for name in names) for combination in combinations}
+        for milestone, combinations in levels.items()
+    }
+    return {
+        method: {
+            milestone: sum(counts[method, others] for others in combinations)
+            for milestone, combinations in with_milestone.items()
+        }
+        for method in methods_of(results)
+        if any(of_method == method for of_method, _ in counts)
+    }
 
 
 def _sort_key(item: SpanSummary, order: dict[str, int], methods: Sequence[str]) -> tuple[str, int, str, int]:

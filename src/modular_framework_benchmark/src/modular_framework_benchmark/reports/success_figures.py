@@ -132,12 +132,13 @@ def levels_figure(summaries: Sequence[MethodSummary], methods: Sequence[str]) ->
     return NamedFigure("levels", "Success by level of the other factors", summary, figure)
 
 
-def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, int]) -> NamedFigure | None:
+def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, Mapping[str, int]]) -> NamedFigure | None:
     """Returns the fraction of each method's episodes that reached each milestone, or None without milestones.
 
     Args:
         spans: Spans by kind, name and method.
-        episodes: Number of finished episodes of each method; an episode without a record reached no milestone.
+        episodes: Number of finished episodes that have each milestone, keyed by method and milestone. An episode
+            without a record reached no milestone.
     """
     milestones = [item for item in spans if item.kind == "milestone"]
     names = list(dict.fromkeys(item.name for item in milestones))
@@ -146,19 +147,22 @@ def milestones_figure(spans: Sequence[SpanSummary], episodes: Mapping[str, int])
     reached = {(item.method, item.name): item.runs - item.failed for item in milestones}
     labels = unique_labels([spaced_words(name) for name in names], 24)
     figure = go.Figure()
-    for index, (method, count) in enumerate(episodes.items()):
-        numbers = [reached.get((method, name), 0) for name in names]
+    for index, (method, counts) in enumerate(episodes.items()):
+        fractions = [(reached.get((method, name), 0), counts.get(name, 0)) for name in names]
         figure.add_trace(
             go.Scatter(
-                x=labels, y=[100.0 * number / count for number in numbers], name=label_text(method),
-                mode="lines+markers", customdata=numbers, marker={"size": 8},
+                x=labels, y=[100.0 * number / count if count else None for number, count in fractions],
+                name=label_text(method), mode="lines+markers", customdata=fractions, marker={"size": 8},
                 line={"color": color_of(index), "dash": dash_of(index)},
-                hovertemplate=f"{label_text(method)}: %{{customdata}} of {count:,} episodes<extra></extra>",
+                hovertemplate=f"{label_text(method)}: %{{customdata[0]}} of %{{customdata[1]}} episodes<extra></extra>",
             )
         )  # fmt: skip
     apply_style(figure, height=380)
     figure.update_yaxes(range=[-2, 102], title_text="episodes that reached it [%]")
-    summary = "Fraction of each method's finished episodes that reached each milestone, in the order of the task."
+    summary = (
+        "Fraction of each method's finished episodes that reached each milestone, in the order of the task. Episodes "
+        "whose levels do not have a milestone are not counted for it."
+    )
     return NamedFigure("milestones", "How far", summary, figure)
 
 

@@ -322,6 +322,12 @@ class ResultDatabase:
         with self._reading() as connection:
             return result_tables.span_totals(connection, number, self._description(connection, number))
 
+    def milestone_levels(self, number: int) -> dict[str, list[dict[str, str]]]:
+        """Returns the combinations of levels at which episodes have each milestone, keyed by milestone."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            return result_tables.milestone_levels(connection, number)
+
     def snapshot_values(self, number: int, leave_out: Collection[str] = ()) -> dict[str, list[tuple[Any, int]]]:
         """Returns the distinct values of each part of the snapshots, with their numbers of episodes."""
         with self._reading() as connection:

@@ -140,6 +140,25 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
     return sums[["count", "ended", "failed", "total_s", "covered_s"]].sum()
 
 
+def milestone_levels(connection: Connection, number: int) -> dict[str, list[dict[str, str]]]:
+    """Returns the combinations of levels at which episodes have each milestone, keyed by milestone.
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+    """
+    rows = connection.execute(
+        select(SPANS.c.name, EPISODES.c.configuration)
+        .join_from(EPISODES, SPANS, SPANS.c.runid == EPISODES.c.id)
+        .where(EPISODES.c.descriptionid == number, SPANS.c.kind == "milestone")
+        .distinct()
+    )
+    levels: dict[str, list[dict[str, str]]] = {}
+    for name, configuration in rows:
+        levels.setdefault(name, []).append(json.loads(configuration))
+    return levels
+
+
 def snapshot_values(
     connection: Connection, number: int, leave_out: Collection[str] = ()
 ) -> dict[str, list[tuple[Any, int]]]:
