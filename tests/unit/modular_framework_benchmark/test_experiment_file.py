@@ -409,6 +409,28 @@ def test_a_limit_or_bound_that_the_statistics_cannot_use_is_a_fault(tmp_path: Pa
     assert fault in found
 
 
+@pytest.mark.parametrize("name", ["seed", "Status", "wall_s", "failure_class", "plannerid"])
+def test_a_metric_with_the_name_of_a_column_is_a_fault(tmp_path: Path, name: str) -> None:
+    (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
+    entry = f"{{function: mine.py:f, name: {name}}}"
+    (found,) = faults_of(PICK.replace("task_time]", f"{entry}]"), tmp_path)
+    assert f"metric '{name}': the name is taken; rename it; allowed: names that differ in more than case" in found
+
+
+def test_success_of_ones_own_must_be_a_rate(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
+    (found,) = faults_of(
+        PICK.replace("[success, task_time]", "[{function: mine.py:f, name: success, kind: time}]"), tmp_path
+    )
+    assert "`success` is a rate" in found
+
+
+@pytest.mark.parametrize("name", ["trial", "outcome", "success", "task_time"])
+def test_a_factor_with_the_name_of_a_column_is_a_fault(tmp_path: Path, name: str) -> None:
+    (found,) = faults_of(PICK.replace("object: [cube", f"{name}: [cube").replace("$object", f"${name}"), tmp_path)
+    assert f"factor '{name}': the name is taken" in found
+
+
 def test_the_episodes_know_the_allowed_values_of_a_metric_of_ones_own(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
     specs = {

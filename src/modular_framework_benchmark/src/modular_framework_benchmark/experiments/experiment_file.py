@@ -34,6 +34,11 @@ from modular_framework_benchmark.experiments.perturb_reading import perturbation
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
+from modular_framework_benchmark.records.column_names import (
+    allowed_names_text,
+    factor_name_faults,
+    metric_name_faults,
+)
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, MetricSpec, RecordedFiles, as_json
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_benchmark.records.perturbation import PERTURBATION
@@ -175,7 +180,7 @@ class _Reader:
         numbers = self._numbers(len(design))
         combinations = self._combinations(factors, design)
         metrics, metric_specs = self._metrics(combinations)
-        self._note_metric_names(metrics, factors)
+        self._note_names(metrics, factors)
         stopping = self._stopping(metrics)
         if "description" in entries:
             reading.text(entries["description"], "description")
@@ -306,14 +311,16 @@ class _Reader:
                 self._reading.faults.add(node.location, f"the metric '{name}' needs {needs}")
         return metrics, metric_specs
 
-    def _note_metric_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:
-        node = self._root.entries.get("metrics")
-        for metric in metrics if node is not None else ():
-            if metric.name.lower() in (name.lower() for name in factors):
-                self._reading.faults.add(
-                    node.location,  # type: ignore[union-attr]
-                    f"'{metric.name}' is both a metric and a factor; rename one of them",
-                )
+    def _note_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:
+        """Adds a fault for each metric or factor with the name of a column of the result tables."""
+        entries = self._root.entries
+        named = [Factor(factor, tuple(levels)) for factor, levels in factors.items() if factor != PERTURBATION]
+        if "metrics" in entries:
+            for fault in metric_name_faults(metrics):
+                self._reading.faults.add(entries["metrics"].location, f"{fault}; rename it; {allowed_names_text()}")
+        if "factors" in entries:
+            for fault in factor_name_faults(named, metrics):
+                self._reading.faults.add(entries["factors"].location, f"{fault}; rename it; {allowed_names_text()}")
 
     def _record(self) -> RecordedFiles:
         node = self._root.entries.get("record")

@@ -20,7 +20,8 @@ from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
 from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of, unmeasured_reason
 
-SIDE_FACTOR = "side"
+SIDE_FACTOR = "(side)"
+"""Name of the factor of both experiments; no name of an experiment's factor has parentheses."""
 AFTER, BEFORE = "after", "before"
 
 

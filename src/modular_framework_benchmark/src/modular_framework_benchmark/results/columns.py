@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from sqlalchemy import Boolean, Column, Connection, Insert, String, inspect
 from sqlalchemy.schema import CreateColumn
 
+from modular_framework_benchmark.records.column_names import (
+    allowed_names_text,
+    factor_name_faults,
+    metric_name_faults,
+)
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric, MetricKind
 from modular_framework_benchmark.results.errors import DescriptionError
-from modular_framework_benchmark.results.schema import ARENA_COLUMNS, EXPERIMENTS, REAL_NUMBER, RESULT_COLUMNS, RUNS
-
-SUCCESS = "success"
+from modular_framework_benchmark.results.schema import EXPERIMENTS, REAL_NUMBER, RUNS
 
 
 def check_names(description: ExperimentDescription) -> None:
@@ -22,34 +24,15 @@ def check_names(description: ExperimentDescription) -> None:
     Raises:
         DescriptionError: A name is invalid; the error lists all invalid names.
     """
-    factors = [factor.name.lower() for factor in description.factors]
-    faults = _metric_faults(description.metrics)
-    taken_names = {metric.name.lower() for metric in description.metrics} | RESULT_COLUMNS | {SUCCESS}
-    faults += [f"factor {each!r}: the name is taken" for each in factors if each in taken_names]
-    faults += [f"factor {each!r} is there twice" for each in sorted(set(factors)) if factors.count(each) > 1]
-    if description.compared not in {factor.name for factor in description.factors}:
-        faults.append(f"compared factor {description.compared!r}: allowed: {', '.join(factors) or 'none'}")
+    faults = metric_name_faults(description.metrics) + factor_name_faults(description.factors, description.metrics)
+    names = [factor.name for factor in description.factors]
+    if description.compared not in names:
+        faults.append(f"compared factor {description.compared!r}: allowed: {', '.join(names) or 'none'}")
     if faults:
         raise DescriptionError(
-            f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; allowed: names that differ in "
-            f"more than case, none of {', '.join(sorted(RESULT_COLUMNS))}, and for metrics none of "
-            f"{', '.join(sorted(ARENA_COLUMNS))}; rename what is named here"
+            f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; {allowed_names_text()}; rename "
+            "what is named here"
         )
-
-
-def _metric_faults(metrics: Sequence[Metric]) -> list[str]:
-    faults: list[str] = []
-    taken_names = set(RESULT_COLUMNS | ARENA_COLUMNS)
-    for metric in metrics:
-        lower = metric.name.lower()
-        if not metric.name.isidentifier():
-            faults.append(f"metric {metric.name!r} is not an identifier, such as planning_time")
-        elif lower in taken_names:
-            faults.append(f"metric {metric.name!r}: the name is taken")
-        elif lower == SUCCESS and (metric.name != SUCCESS or metric.kind is not MetricKind.RATE):
-            faults.append(f"metric {metric.name!r}: `success` is a rate, in lower case")
-        taken_names.add(lower)
-    return faults
 
 
 def metric_column(metric: Metric) -> Column[bool] | Column[float]:

@@ -12,9 +12,10 @@ from typing import Any
 from sqlalchemy import Connection, Row, column, insert, select, table, update
 
 from modular_framework_benchmark.experiments.modes import stored_settings
+from modular_framework_benchmark.records.column_names import SUCCESS
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import ExperimentDescription, MetricKind
-from modular_framework_benchmark.results.columns import SUCCESS, insert_row
+from modular_framework_benchmark.results.columns import insert_row
 from modular_framework_benchmark.results.errors import RecordRefusedError
 from modular_framework_benchmark.results.json_records import to_json
 from modular_framework_benchmark.results.planned_episodes import UNKNOWN_VERSION

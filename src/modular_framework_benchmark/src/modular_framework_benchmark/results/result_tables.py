@@ -11,9 +11,9 @@ import pandas as pd
 from sqlalchemy import Connection, Select, case, column, func, select, table
 
 from modular_framework_benchmark.experiments.modes import MODES, stored_settings
+from modular_framework_benchmark.records.column_names import SUCCESS
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS, ExperimentResults
-from modular_framework_benchmark.results.columns import SUCCESS
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
 

@@ -142,13 +142,3 @@ SNAPSHOT_VALUES = Table(
     UniqueConstraint("name", "digest"),
 )
 SCHEMA = Table("schema_version", METADATA, Column("version", Integer, nullable=False))
-
-RESULT_COLUMNS = frozenset(
-    (
-        "number trial seed status outcome cause begun wall_s simulated_s folder worker drawn_problem cold_start "
-        "failure_class"
-    ).split()
-)
-"""Columns of the result table that every experiment has; factors and metrics must not use these names."""
-ARENA_COLUMNS = frozenset({"id", "experimentid", "plannerid", "experiment", "planner", "version"})
-"""Columns that Planner Arena joins to every run; metrics must not use these names."""
