@@ -29,8 +29,10 @@ from modular_framework_benchmark.predicates.predicate import All, Any, InOrder, 
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, MetricKind
+from modular_framework_benchmark.reports.tables import metric_title
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import load
+from modular_framework_ros.reported_figures import Clock
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -344,10 +346,10 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     (tmp_path / "mine.py").write_text(
         "raise SystemExit\ndef swing(episode):\n    return 1.0\ndef two(a, b):\n    pass\n"
     )
-    entry = "{function: mine.py:swing, better: lower, unit: rad, kind: time}"
+    entry = "{function: mine.py:swing, better: lower, unit: s, kind: time, clock: simulated time}"
     experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
     own = experiment.description.metrics[1]
-    assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
+    assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "s", MetricKind.TIME)
     assert experiment.metric_specs == ("success", OwnMetric("swing", f"{tmp_path / 'mine.py'}:swing", lowest=0.0))
     assert (
         "'swng' is unknown; allowed: swing, two; did you mean 'swing'"
@@ -374,8 +376,25 @@ def test_the_times_of_a_planner_are_limited_by_its_own_budget(tmp_path: Path) ->
 
 def test_a_duration_that_should_be_long_counts_as_0_where_an_episode_fails(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("def held(episode):\n    return 1.0\n")
-    entry = "{function: mine.py:held, kind: time, unit: s, better: higher}"
+    entry = "{function: mine.py:held, kind: time, clock: simulated time, unit: s, better: higher}"
     assert read(PICK.replace("task_time]", f"{entry}]"), tmp_path).description.metrics[1].limit == 0.0
+
+
+def test_a_time_of_ones_own_needs_its_clock_which_the_report_names(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def busy(episode):\n    return 1.0\n")
+
+    def text(clock: str) -> str:
+        entry = f"{{function: mine.py:busy, kind: time, unit: s, better: lower{clock}}}"
+        return PICK.replace("task_time]", f"{entry}]")
+
+    own = read(text(", clock: real time"), tmp_path).description.metrics[1]
+    assert own.clock is Clock.WALL and own.depends_on_machine
+    assert metric_title(own).startswith("busy [s, real time]")
+    assert not read(text(", clock: simulated time"), tmp_path).description.metrics[1].depends_on_machine
+    (missing,) = faults_of(text(""), tmp_path)
+    assert "needs the key clock; allowed: simulated time, real time, processor time" in missing
+    (unknown,) = faults_of(text(", clock: real tme"), tmp_path)
+    assert "did you mean 'real time'" in unknown
 
 
 def test_a_metric_of_ones_own_may_be_a_count_and_have_bounds(tmp_path: Path) -> None:
@@ -420,7 +439,7 @@ def test_a_metric_with_the_name_of_a_column_is_a_fault(tmp_path: Path, name: str
 def test_success_of_ones_own_must_be_a_rate(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("def f(episode):\n    return 1.0\n")
     (found,) = faults_of(
-        PICK.replace("[success, task_time]", "[{function: mine.py:f, name: success, kind: time}]"), tmp_path
+        PICK.replace("[success, task_time]", "[{function: mine.py:f, name: success, kind: value}]"), tmp_path
     )
     assert "`success` is a rate" in found
 

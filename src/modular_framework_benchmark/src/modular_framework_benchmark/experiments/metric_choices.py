@@ -18,7 +18,9 @@ from modular_framework_core.task_constructor.key_spelling import corrected_keys
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock
 
-OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")
+OWN_KEYS = (
+    "function", "name", "unit", "better", "kind", "clock", "limit", "component", "description", "lowest", "highest",
+)  # fmt: skip
 KNOWN_KEYS = ("metric", "limit")
 EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
 
@@ -130,6 +132,10 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | 
 
     better = _choice(node, "better", [item.value for item in Direction], "higher", reading)
     kind = _choice(node, "kind", [item.value for item in MetricKind], "value", reading)
+    clock = _choice(node, "clock", [item.value for item in Clock], "", reading)
+    if kind == MetricKind.TIME.value and "clock" not in node.entries:
+        clocks = ", ".join(item.value for item in Clock)
+        reading.faults.add(item.location, f"a metric of the kind time needs the key clock; allowed: {clocks}")
     limit, lowest, highest = (
         reading.number(node.entries[key], key) if key in node.entries else None
         for key in ("limit", "lowest", "highest")
@@ -141,6 +147,7 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | 
     metric = Metric(
         name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit=limit,
         description=text("description", ""), lowest=lowest, highest=highest,
+        clock=Clock(clock) if clock else None,
     )  # fmt: skip
     for key, fault in _own_faults(metric):
         reading.faults.add(node.entries.get(key, item).location, fault)
