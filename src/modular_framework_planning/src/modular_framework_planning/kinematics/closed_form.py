@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from eaik.IK_HP import HPRobot
+from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
@@ -15,6 +16,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 
 PROBE_ANGLE = 0.37  # generic angle at which no two axes align by chance [rad]
 MAX_CACHED_SOLVERS = 4096  # one solver per value of the locked joint
+ALIGNED_WRIST = 0.01  # volume spanned by the last three axes below which the wrist counts as singular
 
 
 class ClosedForm:
@@ -42,6 +44,9 @@ class ClosedForm:
         self._axes, self._offsets, self._rotation = _axes_and_offsets(model, group, base_link, last_link)
         self.locked_joint = self._choose_locked_joint(group.name)
         self._solvers: dict[float, Any] = {}
+        first, second, third = self._axes[-3:]
+        normal = np.cross(second, third)
+        self._wrist_volume = float(first @ normal), float(first @ np.cross(second, normal))
 
     def _choose_locked_joint(self, name: str) -> int | None:
         """Returns the last joint that can be locked to get a solvable chain; None if no joint needs to be locked."""
@@ -63,6 +68,23 @@ class ClosedForm:
         target[:3, :3] = last_in_base.rotation @ self._rotation
         solutions = np.asarray(self._solver(locked_value).IK(target).Q, dtype=float).reshape(-1, len(self._axes))
         return np.ascontiguousarray(solutions[np.isfinite(solutions).all(axis=1)])
+
+    def has_aligned_wrist(self, candidates: Array) -> NDArray[np.bool_]:
+        """Returns whether the last three axes are linearly dependent, for a chain without a locked joint.
+
+        The pose then has infinitely many solutions. EAIK fixes the last joint, and for three parallel axes (UR) its
+        candidates are wrong. The volume of the unit axes a, b and c at zero is
+        cos(q) a.(b x c) + sin(q) a.(b x (b x c)), where q is the value of the joint with the axis b.
+
+        Args:
+            candidates: Joint vectors, shape (k, joints) [rad].
+
+        Returns:
+            Result per joint vector, shape (k,).
+        """
+        cosine_gain, sine_gain = self._wrist_volume
+        angles = candidates[:, -2]
+        return np.abs(cosine_gain * np.cos(angles) + sine_gain * np.sin(angles)) < ALIGNED_WRIST
 
     def _solver(self, locked_value: float) -> Any:
         key = 0.0 if self.locked_joint is None else round(locked_value, 9)

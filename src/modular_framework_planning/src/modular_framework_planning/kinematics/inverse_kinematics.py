@@ -79,12 +79,22 @@ class InverseKinematics:
             return NUMERIC
         return CLOSED_FORM if self._closed_form.locked_joint is None else CLOSED_FORM_AND_SEARCH
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether a closed form finds all solutions."""
-        return (
-            self._closed_form is not None and self._closed_form.locked_joint is None and not self.settings.position_only
-        )
+    def is_complete(self, tip_link: str, target: Transform, seed: Array) -> bool:
+        """Returns whether `solutions` finds all solutions of a target.
+
+        A closed form of six joints does, unless the wrist is singular: then there are infinitely many solutions.
+
+        Args:
+            tip_link: Link to bring to the target, see tip_offset.
+            target: Target pose of the link in the planning frame.
+            seed: Positions of the whole robot [rad or m].
+        """
+        closed_form = self._closed_form
+        if closed_form is None or closed_form.locked_joint is not None or self.settings.position_only:
+            return False
+        problem = self._problem(target * self.tip_offset(tip_link, seed), seed)
+        candidates = closed_form.solve(self._target_in_base(problem))
+        return not closed_form.has_aligned_wrist(candidates).any()
 
     def _try_closed_form(self) -> ClosedForm | None:
         chain_joints_between = [
@@ -214,14 +224,14 @@ class InverseKinematics:
         """Returns the closed-form solutions within bounds, and their copies shifted by 2 pi, shape (k, joints)."""
         if self._closed_form is None:
             return np.empty((0, len(self.group.joints)))
-        base = (
-            self.model.link_transforms(problem.full_seed)[self.base_link]
-            if not self._chain.is_independent
-            else (self._fixed_base())
-        )
-        in_base = base.actInv(problem.target)
+        in_base = self._target_in_base(problem)
         if self._closed_form.locked_joint is None:
-            return self._polished_solutions(problem, self._closed_form.solve(in_base))
+            candidates = self._closed_form.solve(in_base)
+            solutions = self._polished_solutions(problem, candidates)
+            is_aligned = self._closed_form.has_aligned_wrist(candidates)
+            if is_aligned.any():
+                solutions = np.vstack([solutions, self._singular_solutions(problem, candidates[is_aligned])])
+            return solutions
         sweep_deadline = 0.5 * (
             time.monotonic() + problem.deadline
         )  # the second half of the time is for the numeric search
@@ -236,9 +246,28 @@ class InverseKinematics:
             step *= 0.5
         return solutions
 
-    def _fixed_base(self) -> Transform:
+    def _target_in_base(self, problem: _Problem) -> Transform:
+        if not self._chain.is_independent:
+            return self.model.link_transforms(problem.full_seed)[self.base_link].actInv(problem.target)
         frame = self.model.pin_model.frames[self.model.frame_ids[self.base_link]]
-        return frame.placement
+        return frame.placement.actInv(problem.target)
+
+    def _singular_solutions(self, problem: _Problem, candidates: Array) -> Array:
+        """Returns solutions near the seed and near the candidates of a singular wrist, shape (k, joints)."""
+        starts = np.clip(np.vstack([problem.seed, candidates]), problem.lower, problem.upper)
+        arrived = search(
+            problem.chain,
+            starts,
+            problem.pose,
+            problem.lower,
+            problem.upper,
+            ACCURACY,
+            SEARCH_STEPS,
+            len(starts),
+        )
+        rows = starts[arrived]
+        rows = rows[unique_rows(rows, problem.is_revolute, SAME_SOLUTION)]
+        return full_rotations(rows, problem.is_revolute, problem.lower, problem.upper, MAX_ROTATED_SOLUTIONS)
 
     def _locked_values(self, problem: _Problem, step: float) -> Array:
         """Returns values of the locked joint: a grid over its bounds, and the value of the seed."""

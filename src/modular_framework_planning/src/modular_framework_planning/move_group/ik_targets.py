@@ -62,6 +62,10 @@ class IkTarget:
             )
         return solver.solutions(self.link, self.target * self.offset.inverse(), seed, timeout_s=timeout_s)
 
+    def has_complete_solutions(self, solver: InverseKinematics, seed: Array) -> bool:
+        """Returns whether `solutions` finds all solutions."""
+        return solver.is_complete(self.link, self.target * self.offset.inverse(), seed)
+
     def constraints(
         self, scene: PlanningScene, position_only: bool
     ) -> tuple[PositionConstraint, list[OrientationConstraint]]:

@@ -99,7 +99,8 @@ class KinematicsService(MoveGroupCapability):
             collision_free = first_free(valid, checker.is_free, MAX_COMPARED)
             if collision_free:
                 return clearest(collision_free, scene.positions, checker.distance)
-        if not all(solver.is_complete for solver in solvers):
+        pairs = zip(targets, solvers, strict=True)
+        if not all(target.has_complete_solutions(solver, scene.positions) for target, solver in pairs):
             end_s = start + (
                 sum(solver.settings.total_timeout_s for solver in solvers) if timeout_s is None else timeout_s
             )
