@@ -93,8 +93,9 @@ class GroupJointTargets(GroupSettings):
         self._set_values(self._model.random_values(self._group, self._random))
 
     def get_random_joint_values(self) -> list[float]:
-        """Returns joint values sampled uniformly within the bounds [rad or m]."""
-        return list(self._model.random_values(self._group, self._random).values())
+        """Returns joint values sampled uniformly within the bounds [rad or m]; passive joints keep their target."""
+        values = self._joint_target | self._model.random_values(self._group, self._random)
+        return [values[joint.name] for joint in self._group.variables if joint.name in values]
 
     def get_random_pose(self, end_effector_link: str = "") -> PoseStamped:
         """Returns the pose of a link (default: the end effector link) at joint values sampled within the bounds."""
@@ -177,7 +178,7 @@ class GroupJointTargets(GroupSettings):
         ik_request.group_name, ik_request.ik_link_name = self._group.name, self._link(link, "set the pose for")
         ik_request.pose_stamped.pose = stamped.pose
         ik_request.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
-        ik_request.robot_state = self._state.message_of(self._joint_target)
+        ik_request.robot_state = self._state.message_of(self._seed())
         ik_request.robot_state.is_diff = True
         response = self._servers.call("compute_ik", GetPositionIK, request)
         if response.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
@@ -192,10 +193,15 @@ class GroupJointTargets(GroupSettings):
         found, wanted = self._state.values_of(response.solution), set(self._group_names())
         self._set_values({name: value for name, value in found.items() if name in wanted})
 
+    def _seed(self) -> dict[str, float]:
+        """Returns the joint target without passive joints, which stay where they are."""
+        return {name: value for name, value in self._joint_target.items() if name not in self._model.passive}
+
     def _nearest_values(self, link: str, pose: PoseStamped) -> dict[str, float]:
         """Returns joint values near the current target that minimise the pose error of a link."""
-        start = {**self._state.positions(self._group_names()), **self._joint_target}
-        moved = [joint for joint in self._group.active_joints if joint.is_movable]
+        start = {**self._joint_target, **self._state.positions(self._group_names()), **self._seed()}
+        passive = self._model.passive
+        moved = [joint for joint in self._group.active_joints if joint.is_movable and joint.name not in passive]
         base = next(joint.parent for joint in self._group.joints if joint.is_movable)
         base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
         base_rotation, base_position = _rotation_and_position(base_pose)

@@ -143,10 +143,14 @@ class RobotModel:
         return self.complete({variable.name: variable.default for variable in self.variables if not variable.leader})
 
     def random_values(self, group: Group, generator: random.Random) -> dict[str, float]:
-        """Returns positions of the group's joints, sampled uniformly within the bounds; 0 for an unbounded joint."""
+        """Returns positions of the group's joints without passive joints, sampled uniformly within the bounds.
+
+        An unbounded joint gets 0.
+        """
         drawn = {
             item.name: generator.uniform(item.lower, item.upper) if math.isfinite(item.upper - item.lower) else 0.0
             for item in group.active_variables
+            if item.name not in self.passive
         }
         quaternion_names = [item.name for item in self.base_variables if item.name in drawn and is_quaternion(item)]
         if quaternion_names:
