@@ -44,6 +44,7 @@ from modular_framework_testing.experiments.misspelt_names import (
     in_controllers,
     in_hardware,
     in_launch,
+    in_placing_task,
     in_script,
     write_problem,
 )
@@ -119,6 +120,21 @@ def test_a_task_that_places_in_a_region_needs_the_region(tmp_path: Path) -> None
     assert experiment_faults({**placing, "regions": {"goal": goal}}, tmp_path) == ""
     on_launch = changed_experiment(placing, ("arguments", "regions"), "{goal: {x: [0.1, 0.2], y: [0.4, 0.5]}}")
     assert experiment_faults(on_launch, tmp_path) == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("support: table", "support: block_2", ""),
+        ("support: table", "support: table__link", ""),
+        ("support: table", "support: tabel", "model 'tabel' is unknown; allowed: block_1, block_2, ground_plane, "),
+        ("node_name:", "external_names: {model: [tray]}\nnode_name:", ""),
+        ("node_name:", "external_names: {modl: [tray]}\nnode_name:", "did you mean 'model'"),
+    ],
+)
+def test_a_task_names_models_of_the_world_and_objects(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    faults = in_placing_task("pick_and_place.yaml", old, new, "").refusal_text(tmp_path)
+    assert fault in faults and bool(faults) == bool(fault)
 
 
 def test_all_faults_of_an_experiment_are_listed_at_once(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import (
     KnownNames,
     PlannerNames,
+    model_of,
     names_of_config,
 )
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -57,6 +58,8 @@ class LaunchCheck:
         given: Overriding parameters, keyed by full name.
         extra: Names of overriding parameters that the user's own nodes read.
         regions: Names of regions that episodes add to the regions of the launch.
+        models: Names of the models of the world and of the objects; None if they are unknown, so that no model is
+            checked.
     """
 
     def __init__(
@@ -65,8 +68,10 @@ class LaunchCheck:
         given: Mapping[str, Any] | None = None,
         extra: Container[str] = (),
         regions: Collection[str] = (),
+        models: Collection[str] | None = None,
     ) -> None:
         self._given, self._extra = dict(given or {}), extra
+        self._models = models
         self._regions = {*regions, *launch.below(REGIONS)}
         self.launch = launch.with_parameters(self._given)
         self._names = DeclaredNames(self.launch)
@@ -91,6 +96,7 @@ class LaunchCheck:
                 *program_faults(self.launch.nodes),
                 *sensor_faults(self.launch),
                 *argument_faults(self.launch, self._robot),
+                *self._model_faults(),
                 *self._task_faults(),
             ]
         except (PlanningError, ModelError) as error:
@@ -159,6 +165,14 @@ class LaunchCheck:
             if value not in robot.joints:
                 yield unknown_name(name, "joint", value, robot.joints)
         yield from self._names.below_trees(self._given, robot.by_kind())
+
+    def _model_faults(self) -> Iterator[LaunchFault]:
+        """Yields models and objects that the world lacks."""
+        if self._models is None:
+            return
+        for name, value in self._names.naming("model"):
+            if model_of(value) not in self._models:
+                yield unknown_name(name, "model or object", value, tuple(self._models))
 
     def _kinematics_faults(self) -> Iterator[LaunchFault]:
         """Yields unknown groups, solvers and keys of kinematics.yaml."""
@@ -248,6 +262,8 @@ class LaunchCheck:
         srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
         names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
         names = names.with_regions(self._regions, "the launch argument 'regions', or to 'regions' of the experiment")
+        if self._models is not None:
+            names = names.with_models(self._models, "the world, or to 'objects' of the experiment")
         registry = self.registry()
         return names if registry is None else names.with_planners(lambda: PlannerNames(registry.by_pipeline()))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as Map
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -232,7 +232,9 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     return ObjectNodes(node, model, name, pose, surface, size, spacing, count)
 
 
-def _named_objects(nodes: ObjectNodes, file: Path, taken_names: set[str], reading: Reading) -> list[SceneObject]:
+def _named_objects(
+    nodes: ObjectNodes, file: Path, taken_names: set[str], reading: Reading, world: Collection[str]
+) -> list[SceneObject]:
     """Returns objects with their model's file; adds a fault if another object has the same name.
 
     Args:
@@ -240,6 +242,7 @@ def _named_objects(nodes: ObjectNodes, file: Path, taken_names: set[str], readin
         file: SDF file of the model.
         taken_names: Names of the previous objects; the names of the objects are added.
         reading: Reader that collects faults.
+        world: Names of the models of the world.
     """
     base = nodes.name or file.parent.name
     if nodes.count is not None:
@@ -247,11 +250,15 @@ def _named_objects(nodes: ObjectNodes, file: Path, taken_names: set[str], readin
     elif nodes.name:
         names = [nodes.name]
     else:
-        numbered = (f"{base}_{number}" for number in range(1, len(taken_names) + 2))
-        names = [next(free for free in numbered if free not in taken_names)]
+        numbered = (f"{base}_{number}" for number in range(1, len(taken_names) + len(world) + 2))
+        names = [next(free for free in numbered if free not in taken_names and free not in world)]
     if repeated_names := taken_names.intersection(names):
         location = nodes.node.entries.get("name", nodes.node).location
         reading.faults.add(location, f"two objects have the name '{min(repeated_names)}'; rename one of them")
+    if world_names := set(world).intersection(names):
+        location = nodes.node.entries.get("name", nodes.node).location
+        text = f"the world has a model '{min(world_names)}' already; give the object another name"
+        reading.faults.add(location, text)
     taken_names.update(names)
     is_path = "/" in nodes.model or nodes.model.endswith(".sdf")
     objects = [
@@ -301,7 +308,7 @@ def _check_spacing(objects: Sequence[SceneObject], location: SourceLocation, rea
 
 
 def placed_objects(
-    nodes: Sequence[ObjectNodes], launch: str, arguments: Map[str, str], reading: Reading
+    nodes: Sequence[ObjectNodes], launch: str, arguments: Map[str, str], reading: Reading, world: Collection[str] = ()
 ) -> list[SceneObject]:
     """Returns objects with the files of their models, and adds faults.
 
@@ -310,6 +317,7 @@ def placed_objects(
         launch: Launch file whose description package contains the models.
         arguments: Arguments of the launch file.
         reading: Reader that collects faults.
+        world: Names of the models of the world, which no object may have.
     """
     taken_names: set[str] = set()
     objects: list[SceneObject] = []
@@ -320,7 +328,7 @@ def placed_objects(
         except UnresolvedReference as error:
             reading.faults.add(item.node.entries["model"].location, str(error))
             continue
-        objects += _named_objects(item, file, taken_names, reading)
+        objects += _named_objects(item, file, taken_names, reading, world)
     if len(reading.faults) == before and any(item.spacing_m for item in nodes):
         try:
             sampled_scene(objects, ("check",))

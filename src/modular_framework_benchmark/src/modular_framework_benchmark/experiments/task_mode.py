@@ -212,7 +212,7 @@ def _finish(
     if not task and "task" not in read.unreadable:
         task = reading.resources.task(DEFAULT_TASK, reading.folder)
     models = _world_models(read, sound, reading)
-    objects = placed_objects(nodes, settings.launch, sound, reading)
+    objects = placed_objects(nodes, settings.launch, sound, reading, models or ())
     if settings.perturbation is not None:
         location = _location_of(read.node, PERTURBATION)
         if not nodes and "objects" not in read.unreadable:

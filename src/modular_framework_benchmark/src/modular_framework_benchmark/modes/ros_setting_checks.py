@@ -16,7 +16,9 @@ from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSe
 from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingFault
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.experiments.problem_sets import Problem
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
+from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
@@ -148,7 +150,7 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
     except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
     regions = [region.name for region in settings.regions]
-    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters, regions)
+    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters, regions, _models(read))
     found = check.faults() if is_known else check.faults_of_values()
     faults = tuple(
         SettingFault((item.key, item.name) if item.name else (item.key,), item.text)
@@ -172,6 +174,17 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
             *solver_substitutions(named_solvers(check.kinematics())),
         ),
     )
+
+
+def _models(read: ReadSettings[TaskSettings]) -> tuple[str, ...] | None:
+    """Returns the names of the models of the world and of the objects; None if they are unknown."""
+    if read.unreadable & {"arguments", "objects"}:
+        return None
+    try:
+        world = RosResourceLookup().world_models(read.settings.launch, read.settings.arguments)
+    except UnresolvedReference:
+        return None
+    return (*world, *(item.name for item in read.objects))
 
 
 def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:

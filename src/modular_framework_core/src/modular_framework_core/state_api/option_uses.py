@@ -27,7 +27,8 @@ class Named:
     """The option is a name or a list of names; empty names are ignored.
 
     Attributes:
-        kind: Kind of name: joint_state, trajectory, pose, plan, grasp, posture, group, region or planner;
+        kind: Kind of name: joint_state, trajectory, pose, plan, grasp, posture, group, region, model, series
+            (common part of numbered models) or planner;
             ``option:<name>`` if another option gives the kind.
         made: Whether the state stores a message under the name.
         userdata: Whether the name ``userdata`` refers to the input key ``selected_<kind>``.

@@ -20,7 +20,7 @@ POSES_FILE = "named_poses.yaml"
 _FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": POSES_FILE}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
-PLANNER = "planner"
+PLANNER, MODEL, SERIES = "planner", "model", "series"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,10 @@ class PlannerNames(Collection[str]):
 
 @dataclass(frozen=True, slots=True)
 class KnownNames:
-    """Known names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, region, planner.
+    """Known names by kind.
+
+    The kinds are joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, region, model,
+    planner; and series, the common parts of numbered models.
 
     Attributes:
         names: Kind -> known names, except for planners. Names of an absent kind are not checked.
@@ -67,6 +70,9 @@ class KnownNames:
 
     def of_kind(self, kind: str) -> Collection[str] | None:
         """Returns the known names of a kind; None if names of this kind are not checked."""
+        if kind == SERIES:
+            models = self.names.get(MODEL)
+            return None if models is None else {name.removesuffix("_1") for name in models if name.endswith("_1")}
         return self.planners() if kind == PLANNER else self.names.get(kind)
 
     def with_names(self, further_names: Mapping[str, frozenset[str]]) -> KnownNames:
@@ -85,6 +91,16 @@ class KnownNames:
         """
         names, origins = {**self.names, "region": frozenset(regions)}, {**self.origins, "region": origin}
         return replace(self, names=names, origins=origins)
+
+    def with_models(self, models: Collection[str], origin: str) -> KnownNames:
+        """Returns a copy with the models of the world.
+
+        Args:
+            models: Names of the models.
+            origin: Source of the models, for messages.
+        """
+        names, origins = {**self.names, MODEL: frozenset(models)}, {**self.origins, MODEL: origin}
+        return replace(self, names=names, origins=origins | {SERIES: origin})
 
     def with_planners(self, planners: Callable[[], PlannerNames | None]) -> KnownNames:
         """Returns a copy with the function that returns the available planners; the copy calls the function once."""
@@ -107,6 +123,11 @@ class KnownNames:
             names["posture"] = frozenset(robot.group_states.get(self.manipulator_group, {}))
             origins["posture"] = f"group '{self.manipulator_group}' of {origin}"
         return replace(self, names=names, origins=origins)
+
+
+def model_of(name: str) -> str:
+    """Returns the model of an object of the planning scene, which is named MODEL or MODEL__LINK."""
+    return name.partition("__")[0]
 
 
 def names_of_config(folder: Path) -> KnownNames:

@@ -7,6 +7,7 @@ from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
+from modular_framework_core.task_constructor.known_names import MODEL
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_keys import SHARED_USERDATA, machine_keys, required_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
@@ -14,7 +15,7 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateC
 from modular_framework_ros.allowed_names import listing
 
 DEFAULT_OUTCOMES = ("success", "fail")
-MANAGER_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp")
+EXTERNAL_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp", MODEL)
 
 
 class HeaderReader:
@@ -154,7 +155,7 @@ class HeaderReader:
                 node.location, f"external_names must be a mapping such as {{plan: [homing]}}, found {kind_of(node)}"
             )
             return {}
-        corrected = corrected_keys(node, MANAGER_KINDS, "external_names: kind", self._faults)
+        corrected = corrected_keys(node, EXTERNAL_KINDS, "external_names: kind", self._faults)
         names_by_kind = {
             kind: header_fields.names(
                 value, f"external_names: {kind}", self._faults, may_be_empty=True, example="[homing]"

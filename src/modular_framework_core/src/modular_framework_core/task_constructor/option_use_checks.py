@@ -19,13 +19,19 @@ from modular_framework_core.state_api.option_uses import (
     OutputKeys,
     kind_of,
 )
-from modular_framework_core.task_constructor.known_names import PLANNER, KnownNames
+from modular_framework_core.task_constructor.known_names import MODEL, PLANNER, SERIES, KnownNames, model_of
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 from modular_framework_ros.allowed_names import listing, nearest
 
 _PLURALS = {"trajectory": "trajectories"}
-_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", "region": "region", PLANNER: "planner"}
+_NON_MESSAGE_KINDS = {
+    "posture": "posture",
+    "group": "planning group",
+    "region": "region",
+    SERIES: "series of objects",
+    PLANNER: "planner",
+}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
@@ -128,6 +134,10 @@ class _Checker:
                 if self._inputs is not None and not self._inputs.intersection(keys):
                     self._require_key("input", keys[-1], f"option '{option}' 'userdata'", item.location)
                 continue
+            if kind == MODEL:
+                if name == FROM_USERDATA:
+                    continue  # the annotation Key names the userdata key
+                name = model_of(name)
             names = None if kind in self._unchecked_kinds else self._known.of_kind(kind)
             may_be_stored = name in self._possibly_stored and kind not in _NON_MESSAGE_KINDS
             if names is not None and name not in names and not may_be_stored:

@@ -12,7 +12,7 @@ from modular_framework_core.managers.ros_acm_services import apply_matrix
 from modular_framework_core.srv import GetModifiedACM, GetModifiedACMRequest, ModifyACM, ModifyACMRequest
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key, Named
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_states.manager_clients import ManagerError
 
@@ -25,7 +25,7 @@ LINK_MODIFICATIONS = {
     "self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
     "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION,
 }
-Objects = Annotated[Sequence[str] | str, Key("input", "selected_grasp", when=FROM_USERDATA)]
+Objects = Annotated[Sequence[str] | str, Key("input", "selected_grasp", when=FROM_USERDATA), Named("model")]
 SERVICE_TIMEOUT_S = 10.0
 
 

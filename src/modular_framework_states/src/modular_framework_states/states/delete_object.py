@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Annotated, Any, Unpack
 
 from modular_framework_core.scene.manage_object import request_to_delete
 from modular_framework_core.scene.ros_manage_object import RefusedError, delete
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Named
 
 
 class DeleteObject(FrameworkState):
@@ -19,7 +20,7 @@ class DeleteObject(FrameworkState):
         **keys: Outcomes and userdata keys of any state.
     """
 
-    def __init__(self, object_name: str, **keys: Unpack[StateKeys]) -> None:
+    def __init__(self, object_name: Annotated[str, Named("model")], **keys: Unpack[StateKeys]) -> None:
         super().__init__(**keys)
         self._object_name = object_name
 

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger, TriggerRequest
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
-from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, Key, Named
 from modular_framework_ros.calls import CallError, request_service, wait_until
 
 OBJECT_KEY = "selected_object"
@@ -38,7 +38,7 @@ class GenerateGrasps(FrameworkState):
 
     def __init__(
         self,
-        object_name: Annotated[str, Key("input", OBJECT_KEY, when=FROM_USERDATA)] = "",
+        object_name: Annotated[str, Key("input", OBJECT_KEY, when=FROM_USERDATA), Named("model")] = "",
         keep_grasps: bool = False,
         timeout: Positive = 60.0,
         **keys: Unpack[StateKeys],

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Annotated, Any, Unpack
 
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError
 from modular_framework_states.object_series import SeriesError, object_series, scene_objects
 
@@ -26,7 +27,7 @@ class NextInTower(FrameworkState):
             next object, and ``selected_support`` the name of the object below it.
     """
 
-    def __init__(self, prefix: str, **keys: Unpack[StateKeys]) -> None:
+    def __init__(self, prefix: Annotated[str, Named("series")], **keys: Unpack[StateKeys]) -> None:
         super().__init__(**keys)
         self._prefix = str(prefix)
         self._left: list[tuple[str, str]] | None = None  # None before the first object of a tower

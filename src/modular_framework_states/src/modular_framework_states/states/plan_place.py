@@ -62,7 +62,7 @@ class PlanPlace(FrameworkState):
 
     def __init__(
         self,
-        support: Annotated[str, Key("input", "selected_support", when=FROM_USERDATA)],
+        support: Annotated[str, Key("input", "selected_support", when=FROM_USERDATA), Named("model")],
         region: Annotated[str, Named("region")] = "",
         overhang: NotNegative = 0.0,
         align: bool = False,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import rospy
 
@@ -12,6 +12,7 @@ from modular_framework_core.scene.ros_manage_object import RefusedError, spawn
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Vector
+from modular_framework_core.state_api.option_uses import Named
 
 
 class SpawnObject(FrameworkState):
@@ -28,8 +29,8 @@ class SpawnObject(FrameworkState):
 
     def __init__(
         self,
-        object_type: str,
-        object_name: str = "",
+        object_type: Annotated[str, Named("model", made=True)],  # also the name of an object without a name
+        object_name: Annotated[str, Named("model", made=True)] = "",
         position: Vector = (0.0, 0.0, 0.0),
         orientation: Vector = (0.0, 0.0, 0.0),
         reference_frame: str = "world",

@@ -306,6 +306,29 @@ def in_task(old: str, new: str, words: str, parameters: dict[str, Any] | None = 
     return Case("task of an experiment", new, refusal_text, words)
 
 
+def in_placing_task(task: str, old: str, new: str, words: str) -> Case:
+    """Returns the case of a text in a shipped task that places objects, of an experiment with two blocks.
+
+    Args:
+        task: Name of the shipped task.
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        scripts = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
+        (folder / "machines").symlink_to(scripts / "machines")
+        (folder / "task.yaml").write_text(_replace_first((scripts / task).read_text(), old, new))
+        block = {**TASK["objects"][0], "name": "block", "count": 2, "spacing": 0.2}
+        regions = {"goal": {"x": [0.1, 0.2], "y": [0.4, 0.5]}}
+        success = {"stacked": {}}
+        placing = {"task": "task.yaml", "objects": [block], "regions": regions, "success": success}
+        return experiment_faults({**PLAIN, **placing}, folder)
+
+    return Case(f"{task} of an experiment", new, refusal_text, words)
+
+
 def in_script(text: str, words: str, state: str = "") -> Case:
     """Returns the case of a task that `state_machine_generator --check` reads, with a state of the user's own.
 
@@ -684,6 +707,19 @@ CASES = [
     in_script(PLANNER_TASK.format("omple/RRT"), "planner 'omple/RRT' is unknown.*did you mean 'ompl/RRT'"),
     in_script(STATE_TASK, "joint state 'stability_pos' is unknown.*did you mean 'stability_pose'"),
     in_script(OWN_TASK.format(name="rospy", option=""), "is the Python module .*choose another name", OWN_STATE),
+    # Models and objects
+    in_placing_task(
+        "pick_and_place.yaml",
+        "support: table",
+        "support: tabel",
+        "'support': the model 'tabel' is unknown; allowed: block_1, block_2, .*did you mean 'table'",
+    ),
+    in_placing_task(
+        "stack.yaml", "prefix: block", "prefix: blok", "series of objects 'blok' is unknown; .*did you mean 'block'"
+    ),
+    in_placing_task("stack.yaml", "object_name: userdata", "object_name: blok_1", "'blok_1'.*did you mean 'block_1'"),
+    in_parameters(f"{GENERATOR}/object_name", "cubee", "no model or object 'cubee'; .*did you mean 'cube_1'"),
+    in_experiment(TASK, ("objects", 0, "name"), "table", "the world has a model 'table' already"),
     # Planning problems
     in_problem("request", ("group_name",), "panda_amr", "no planning group 'panda_amr'.*did you mean 'panda_arm'"),
     in_problem(
