@@ -94,6 +94,7 @@ def test_links_in_a_loop_are_named_with_the_joint_that_closes_it() -> None:
         "r.urdf:8: joint 'c' closes a loop of links: l2 -> l3 -> l2",
     )
     assert remedy == "allowed: a tree; correct the parent of one of its joints"
+    assert [joint.name for joint in read_urdf('<robot name="r"><joint name="a" type="fixed"/></robot>').joints] == ["a"]
 
 
 SRDF = """<robot name="r"><group name="arm"><!-- a comment --><joint name="b"/><chain base_link="x" tip_link="y"/>

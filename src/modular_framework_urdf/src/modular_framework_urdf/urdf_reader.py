@@ -82,10 +82,11 @@ def read_urdf(text: str | bytes, location: str = "robot_description") -> Robot:
 
 
 def _refuse_loops(joints: Sequence[Joint], location: str) -> None:
-    """Raises an error if a link is above itself."""
+    """Raises an error if a link is above itself; joints without links, as in a list of joints, have no place."""
     parents = TopologicalSorter[str]()
     for joint in joints:
-        parents.add(joint.child, joint.parent)
+        if joint.parent and joint.child:
+            parents.add(joint.child, joint.parent)
     try:
         parents.prepare()
     except CycleError as error:
