@@ -109,12 +109,9 @@ class WheelGeometry:
 
     def _frame(self, link: str) -> Array:
         """Returns the pose of a link in the root link, with all joints at position 0."""
+        joints_above = {joint.child: joint for joint in self._joints.values() if joint.child}
         frame = np.eye(4)
-        ancestor = link
-        for _ in range(len(self._joints) + 1):
-            joint_above = next((joint for joint in self._joints.values() if joint.child == ancestor), None)
-            if joint_above is None:
-                return frame
-            frame = joint_above.origin.matrix() @ frame
-            ancestor = joint_above.parent
-        raise self._error(f"the path from link '{link}' to the root link never ends; expected a tree of links")
+        while link in joints_above:
+            frame = joints_above[link].origin.matrix() @ frame
+            link = joints_above[link].parent
+        return frame
