@@ -212,7 +212,7 @@ make_python_environment() {
   touch "$STAMPS/$digest"
 }
 
-# What only the documentation site needs. It has a folder of its own, so that the environment stays what requirements.txt says.
+# Installs the packages of the documentation site into a separate folder, so that the environment still matches requirements.txt.
 install_site_builder() {
   local digest
   digest=$(sha256sum "$ROOT/requirements-site.txt" | cut -d' ' -f1)

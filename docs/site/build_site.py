@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds the documentation site, which needs no server: `./install.sh site`.
 
-Sphinx needs all pages in one folder. This program copies the Markdown pages of the repository to such a folder, at
-their paths in the repository, so that the same relative links work on a forge and on the site. Then it adds:
+Sphinx needs all pages in a single folder. The program copies the Markdown pages of the repository to a source folder
+without a change of their relative paths, so that links work on a forge and on the site. The program then adds:
 
 - the navigation, from the lists of links in `docs/README.md`
 - a page for each package of `public_modules.toml`, which Sphinx fills from the docstrings of the package
 - a page that lists the READMEs of all packages
 
-Every warning of Sphinx is an error: a broken link, a page outside the navigation, a malformed docstring.
+Sphinx warnings fail the build: broken links, pages outside the navigation, malformed docstrings.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PAGES = ("README.md", "CHANGELOG.md", "docs/**/*.md", "src/*/README.md", "src/*/
 FILES = ("docs/**/*.png", "docs/**/*.svg", "docs/**/*.webp", "docs/**/*.mp4", "CITATION.cff")
 FRONT_PAGE = "docs/README"
 PUBLIC_MODULES = "docs/site/public_modules.toml"
-GENERATED_PAGES = {"Reference": ("/api/index", "/packages")}  # by heading of the front page
+GENERATED_PAGES = {"Reference": ("/api/index", "/packages")}  # keyed by heading of the front page
 PAGE_LINK = re.compile(r"^- \[[^\]]+\]\(([^)#\s]+)\.md\)", re.MULTILINE)
 PACKAGE_KINDS = {
     "Framework": "src/modular_framework_*/README.md",
@@ -84,10 +84,10 @@ def write_sources(root: Path, source: Path) -> None:
 
 
 def navigation(front_page: str) -> list[str]:
-    """Returns a hidden table of contents for each section of the front page with links to pages.
+    """Returns a hidden table of contents for each section of the front page that links to pages.
 
     Args:
-        front_page: Text with a list item per page below the heading of its kind.
+        front_page: Markdown text with a section per kind of page and a list item per page.
     """
     parts = re.split(r"^## (.+)$", front_page, flags=re.MULTILINE)
     tables = []
@@ -102,7 +102,7 @@ def table_of_contents(pages: list[str], *options: str) -> str:
     """Returns a directive that adds pages to the navigation.
 
     Args:
-        pages: Names of pages without the ending, relative to the page with the directive or absolute.
+        pages: Page names without file extension, absolute or relative to the page with the directive.
         *options: Options of the directive `toctree`, without the leading colon.
     """
     fields = [f":{option}" if ": " in option else f":{option}:" for option in options]
@@ -124,12 +124,12 @@ def package_list(root: Path) -> str:
 
 
 def write_api_pages(root: Path, folder: Path, public_modules: dict[str, list[str]]) -> None:
-    """Writes a page per package and the page that lists them.
+    """Writes an API page per package, and the index of these pages.
 
     Args:
         root: Repository with the packages.
         folder: Folder to create.
-        public_modules: Module names relative to their package, by package.
+        public_modules: Module names relative to their package, keyed by package.
     """
     folder.mkdir(parents=True)
     for package, modules in public_modules.items():
@@ -140,11 +140,11 @@ def write_api_pages(root: Path, folder: Path, public_modules: dict[str, list[str
 
 
 def api_page(root: Path, package: str, modules: list[str]) -> str:
-    """Returns a page whose sections Sphinx fills from the docstrings of a package's public modules.
+    """Returns the API page of a package; Sphinx fills its sections from the docstrings of the public modules.
 
     Args:
         root: Repository with the package.
-        package: Python package, which has the name of its ROS package.
+        package: Name of the Python package and of its ROS package.
         modules: Module names relative to the package.
     """
     (readme,) = (file for pattern in PAGES for file in root.glob(pattern) if file.parent.name == package)
@@ -155,7 +155,7 @@ def api_page(root: Path, package: str, modules: list[str]) -> str:
 
 
 def write_entrance(html: Path) -> None:
-    """Writes the page that leads to the front page, because the front page is not at the top of the site.
+    """Writes a top-level page that redirects to the front page, which is in a subfolder.
 
     Args:
         html: Folder of the site.

@@ -23,7 +23,7 @@ suppress_warnings = ["ref.python"]  # packages may have errors of the same name
 highlight_language = "none"
 smartquotes_action = "D"  # dashes only: a quotation mark in a docstring is part of a value
 
-myst_heading_anchors = 4  # the anchors of headings are those of GitHub
+myst_heading_anchors = 4  # GitHub's anchors of headings
 
 autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": True}
 autoclass_content = "both"  # arguments are described in the docstring of __init__
