@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Shows the state of a task, which the server sends as changes; see page_protocol.py for the messages.
+// Shows the state of a task from the changes that the server sends; page_protocol.py defines the messages.
 
 const RETRY_MS = 1000;
 const AXIS_STEPS_S = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
-const MAX_ITEMS = 300; // in a list
-const MARGIN_S = 0.5; // log lines this long before and after a selected state belong to the state
+const MAX_ITEMS = 300; // per list
+const MARGIN_S = 0.5; // log lines within this time of a selected run belong to the run
 
-// Browsers draw a frame of another host name in another process, so that the view of the world does not slow the page.
+// A frame from another host name has its own browser process, so the view of the world does not slow down the page.
 const OTHER_LOOPBACK_NAMES = { "127.0.0.1": "localhost", localhost: "127.0.0.1" };
 
 const element = (id) => document.getElementById(id);
 
-/** Everything that the server sent; times are seconds of its clock. */
+/** State received from the server; times are in seconds of the server's clock. */
 const state = { task: null, runs: new Map(), log: new Map(), drawing: "", viewer: "", offset_s: 0, selected: null };
-const rows = new Map(); // of the time line, keyed by path of the state
-const bars = new Map(); // keyed by index of the run
+const rows = new Map(); // rows of the time line, keyed by state path
+const bars = new Map(); // bars of the time line, keyed by run index
 
 function make(kind, className, text) {
   const made = document.createElement(kind);
@@ -77,7 +77,7 @@ function connect() {
   const socket = new WebSocket(address);
   let isFirst = true;
   socket.onmessage = (event) => {
-    if (isFirst) { // a server that restarted counts from the beginning
+    if (isFirst) { // a restarted server restarts its indices
       isFirst = false;
       state.task = null;
       state.log.clear();
@@ -91,7 +91,7 @@ function connect() {
   };
 }
 
-// ---- the task as a whole -------------------------------------------------------------------------------------------
+// ---- summary of the task -------------------------------------------------------------------------------------------
 const PHASES = {
   waiting: "waiting", running: "running", succeeded: "succeeded", failed: "failed", ended: "ended", lost: "lost",
 };
@@ -107,7 +107,7 @@ function showTask() {
   showElapsed();
 }
 
-function setText(id, text) { // a screen reader repeats a text that is set again
+function setText(id, text) { // setting the same text makes a screen reader repeat it
   if (element(id).textContent !== text) element(id).textContent = text;
 }
 
@@ -143,7 +143,7 @@ function showDrawing(text) {
   state.drawing = text;
   const svg = text === "" ? null : new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
   element("graph").replaceChildren(...(svg === null ? [] : [document.importNode(svg, true)]));
-  for (const title of element("graph").querySelectorAll("title")) title.remove(); // Graphviz' names of nodes
+  for (const title of element("graph").querySelectorAll("title")) title.remove(); // node names by Graphviz
   for (const link of element("graph").querySelectorAll("a")) link.removeAttributeNS("http://www.w3.org/1999/xlink", "title");
   for (const node of element("graph").querySelectorAll(".node")) {
     if (node.id.includes("|") || node.id === "") continue; // outcomes
@@ -208,7 +208,7 @@ function showWorld(address) {
     return;
   }
   const url = new URL(address);
-  url.hostname = OTHER_LOOPBACK_NAMES[location.hostname] ?? location.hostname; // the page may be open elsewhere
+  url.hostname = OTHER_LOOPBACK_NAMES[location.hostname] ?? location.hostname; // the browser may run on another computer
   const frame = make("iframe");
   frame.title = "World";
   frame.setAttribute("sandbox", "allow-scripts allow-same-origin");

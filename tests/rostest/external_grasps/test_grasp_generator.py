@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The example of the page, in an environment of its own, does what every generator does; each fault has its cause."""
+"""The documented example in a separate environment behaves like every generator; a fault has the right cause."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FAULTY_SEED = 13
 
 
 def make_environment(folder: Path) -> Path:
-    """Makes a Python environment with mbf_method and its requirements, without a network; returns its interpreter."""
+    """Creates a Python environment with mbf_method and its requirements offline, and returns the interpreter."""
     subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", folder], check=True)
     (packages,) = folder.glob("lib/python3*/site-packages")
     sources = [ROOT / "src/mbf_method/src", Path(np.__file__).parents[1]]
@@ -63,7 +63,7 @@ class TestExternalGrasps(GraspGeneratorConformance):
         assert opening == pytest.approx(0.04 + 2 * 0.012, abs=1e-3)
 
     def report_of_a_generation(self) -> dict[str, Any]:
-        """Lets the generator generate grasps; returns the report of the component."""
+        """Requests grasps from the generator, and returns the report of the component."""
         reports: list[dict[str, Any]] = []
         subscriber = rospy.Subscriber(
             "component_reports", String, lambda message: reports.append(json.loads(message.data))

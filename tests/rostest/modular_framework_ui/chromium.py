@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Debian's Chromium without a window, driven by its DevTools protocol."""
+"""Controls Debian's Chromium without a window, through the DevTools protocol."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ANSWER_TIMEOUT_S = 60.0
 
 
 class Chromium:
-    """A browser with one page; a context manager that ends the browser.
+    """A browser with a single page, as a context manager that ends the browser.
 
     Args:
         address: Address of the page.
@@ -60,7 +60,7 @@ class Chromium:
         return answer["result"].get("value")
 
     def text(self, selector: str) -> str:
-        """Returns the text of the first element that a CSS selector finds; "" if there is none."""
+        """Returns the text of the first element that a CSS selector finds; "" without a match."""
         return str(self.evaluate(f"document.querySelector({json.dumps(selector)})?.textContent ?? ''"))
 
     def shows(self, selector: str, text: str, timeout_s: float = 60.0) -> None:

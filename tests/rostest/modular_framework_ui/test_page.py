@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page follows a task that runs: what its server sends, and what a browser shows."""
+"""The page follows a running task: messages of the server, and contents in a browser."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ FAILURE = "no object is between the fingers"
 
 
 class Page:
-    """What a page without a browser has received."""
+    """State of a page, from the messages to a client without a browser."""
 
     def __init__(self, address: str) -> None:
         self.task: dict[str, Any] = {}
@@ -188,7 +188,7 @@ def test_the_page_follows_nested_and_concurrent_states_to_a_failure_with_its_rea
     until(lambda: "pick_like/Pick/Lift" in page.drawing, "the drawing")
     go_on(page, ["Plan", "Plan/PlanGrasp", "Plan/PlanPregrasp"], "planned")
     until(lambda: "/pick_like/Pick/Close" in page.active(), "the gripper closes")
-    late = Page(address)  # a page that is opened in the midst of the task
+    late = Page(address)  # a page that is opened during the task
     go_on(late, ["Pick", "Pick/Close"], "closed", "fail")
     assert task.wait(60.0) == 1
     for each in (page, late):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images, camera model and pose of one instant become the view of a method."""
+"""Images, camera matrix and camera pose with the same stamp become the camera view of a method."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ class TransformsFake:
 
 
 class TimeFake:
-    """Holds no time."""
+    """Time that is never held."""
 
     def now(self) -> None:
         return None
 
 
 class CameraFake:
-    """Publishes a message of each topic for each stamp as soon as somebody subscribes.
+    """Publishes a message with each stamp as soon as a subscriber exists.
 
     Attributes:
-        stamps_s: Stamps of the messages, by the last part of the topic.
+        stamps_s: Stamps of the messages [s], keyed by the last part of the topic.
         encoding: Encoding of the colour image.
     """
 
@@ -84,7 +84,7 @@ class CameraFake:
 
 @pytest.fixture
 def source(monkeypatch: pytest.MonkeyPatch) -> CameraSource:
-    """A source whose camera, transforms and time are fakes."""
+    """A camera source with fakes of camera, transforms and time."""
     topics = {"depth_image_topic_name": "camera/depth", "rgb_image_topic_name": "camera/colour"}
     monkeypatch.setattr(ros_camera_source, "Transforms", TransformsFake)
     monkeypatch.setattr(ros_fresh_messages, "SimulatedTime", TimeFake)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A query becomes the request of a method, and the grasps of a method become candidates of the hand."""
+"""A generator query becomes a request to a method, and the returned grasps become candidates."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from two_finger_hands import jaws  # noqa: E402
 
 PAD_CENTRE_TO_TOOL_M = 0.115 - 0.095
-"""From the file of the hand: the tool frame is in front of the centre of the pads."""
+"""Distance of the tool frame in front of the centre of the pads, from the hand's file."""
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A request for the grasps of a box."""
+"""Fixture: a grasp request for a box."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mbf_method import GraspRequest, Gripper, RobotState, SceneObject
 
 @pytest.fixture
 def box_request() -> GraspRequest:
-    """A box of 0.04 x 0.07 x 0.1 m, by its corners, on a support at z = 0."""
+    """Request for a box of 0.04 x 0.07 x 0.1 m on a support at z = 0; the points are the corners of the box."""
     corners = np.array([[x, y, z] for x in (-0.02, 0.02) for y in (-0.035, 0.035) for z in (0.0, 0.1)])
     none = np.zeros((0, 3))
     box = SceneObject("box", corners, corners / np.linalg.norm(corners, axis=1)[:, None], none, none.astype(np.int64))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method with the fault that its argument names; `tests/unit/mbf_method/test_method_faults.py` starts it."""
+"""A method with the fault named by its argument, for `tests/unit/mbf_method/test_method_faults.py`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mbf_method import GraspRequest, Grasps, grasp_method, served_method  # noqa
 
 FAULT = sys.argv[1]
 FAULTY_SEED = 13
-"""Seed of the requests to which the method responds with its fault."""
+"""Seed of the requests that trigger the fault."""
 
 
 @grasp_method(camera=FAULT == "needs a camera")

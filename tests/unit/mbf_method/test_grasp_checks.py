@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The result of a method is checked: names, shapes, values, frame and number."""
+"""Invalid names, shapes, values, frames and counts in the result of a method are found."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mbf_method.grasps import checked_grasps
 
 
 def result(**changes: Any) -> dict[str, Any]:
-    """Returns two valid grasps with changes."""
+    """Returns two valid grasps with some fields replaced."""
     poses, halves = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1)), np.full(2, 0.5)
     return {"frame": "world", "poses": poses, "scores": halves, "widths": halves / 10, **changes}
 

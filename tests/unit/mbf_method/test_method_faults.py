@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method in another process is called, and each of its faults ends the call with its cause within the limits."""
+"""Calls of a method in another process: each fault ends the call in time, and the error names the cause."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from mbf_method.served_method import GRASPS
 FAULTY_METHOD = str(Path(__file__).parent / "faulty_method.py")
 FAULTY_SEED = 13
 SPARE_S = 8.0
-"""Time for the end of a process, beyond the limits of a call."""
+"""Time for the end of a process, in addition to the limits of a call."""
 
 MakeClient = Callable[..., MethodClient]
 
 
 @pytest.fixture
 def make_client() -> Iterator[MakeClient]:
-    """Returns a function that creates the client of a faulty method; at the end, no process remains."""
+    """Yields a function that creates the client of a faulty method; then checks that no process remains."""
     clients: list[MethodClient] = []
 
     def make(fault: str, **limits: float) -> MethodClient:

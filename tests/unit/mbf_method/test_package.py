@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The package is usable in a foreign environment: Python 3.8, without ROS, from the example of its page."""
+"""The package works in a foreign environment: Python 3.8, without ROS, with the documented example."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages are msgpack with the arrays of openpi-client, and survive the way there and back."""
+"""Messages are msgpack with openpi-client's encoding of arrays; encoding and decoding preserve all values."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_request_arrives_as_it_was_sent(box_request: GraspRequest) -> None:
     assert received.target.points.tolist() == box_request.target.points.tolist()
     assert received.target.triangles.dtype == np.int64
     assert received.robot.joint_names == ("j1",)
-    received.target.points[0] = 0.0  # may be changed, as PyTorch expects
+    received.target.points[0] = 0.0  # writable, as PyTorch expects
 
 
 @pytest.mark.parametrize("value", [np.array([object()]), np.array([1j]), object()])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The drawing of a running machine has the ids by which the page finds its states."""
+"""The drawing of a running machine has the ids with which the page finds states and transitions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server of the page: files, refused requests, and changes to quick, late and frozen browsers."""
+"""The page server: files, refused requests, and messages to fast, late and frozen browsers."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_a_page_that_sends_something_is_disconnected(served: Served) -> None:
 
 
 def open_frozen(served: Served) -> socket.socket:
-    """The WebSocket of a frozen browser, which reads no more than the first bytes."""
+    """The WebSocket of a frozen browser, which reads only the first bytes."""
     server = served.server
     frozen = socket.socket()
     frozen.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page knows of a task, from the messages about the task."""
+"""The task model derives runs, outcomes and phases from the messages about a task."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_a_repeated_status_and_structure_change_nothing(model: TaskModel) -> Non
 
 def test_reports_give_outcomes_reasons_and_the_times_of_the_task(model: TaskModel, clock: Clock) -> None:
     report(model, "start", 0.5, "Look", active=["Look"])
-    clock.now_s += 0.3  # smach comes later, as in run_task
+    clock.now_s += 0.3  # smach is later than the report, as in run_task
     for structure in (PICK, HOLD):
         model.note_structure(structure)
     note_active(model, "/pick", "Look")
@@ -181,7 +181,7 @@ def test_the_same_task_started_again_is_a_new_task(model: TaskModel, clock: Cloc
 
 def test_a_report_that_arrives_twice_or_out_of_order_changes_no_run(model: TaskModel) -> None:
     report(model, "start", 5.0, "Look", active=["Look"])
-    for _ in range(2):  # a latched message is sent again to a subscriber that connects again
+    for _ in range(2):  # a latched message is received again after a reconnection
         report(model, "end", 6.0, "Look", state_elapsed_s=1.0, outcome="found")
     report(model, "running", 5.9, "Look")
     assert (len(runs_of(model)), model.changes_since(0).task.number) == (1, 1)

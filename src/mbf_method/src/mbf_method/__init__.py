@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves a method of any Python environment to the framework, without ROS."""
+"""Serves a method from its own Python environment to the framework, without ROS."""
 
 from mbf_method.grasp_request import CameraView, GraspRequest, Gripper, RobotState, SceneObject
 from mbf_method.grasps import Grasps

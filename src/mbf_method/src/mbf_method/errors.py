@@ -5,7 +5,7 @@ from __future__ import annotations
 
 
 class MethodError(RuntimeError):
-    """A method in another process did not return a valid result; the message is the cause."""
+    """A method in another process did not return a valid result; the message states the cause."""
 
 
 class MethodStartError(MethodError):
@@ -13,7 +13,7 @@ class MethodStartError(MethodError):
 
 
 class MethodVersionError(MethodError):
-    """The method is of another kind, or speaks another version of the protocol."""
+    """The kind of the method or its protocol version differs from the required value."""
 
 
 class MethodDiedError(MethodError):
@@ -25,11 +25,11 @@ class MethodLateError(MethodError):
 
 
 class MethodRaisedError(MethodError):
-    """The function of the method raised an exception."""
+    """The method's function raised an exception."""
 
 
 class InvalidOutputError(MethodError):
-    """The result has wrong names, shapes, values or frames."""
+    """A field name, shape, value or frame of the result is invalid."""
 
 
 class TooLargeError(MethodError):

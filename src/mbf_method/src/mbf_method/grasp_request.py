@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Input of a grasp method: the object to grasp, with its surroundings and the hand."""
+"""Input of a grasp method: target object, obstacles, gripper, robot state and camera images."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ class SceneObject:
     Attributes:
         name: Name of the object.
         points: Points on the surface, shape (n, 3) [m].
-        normals: Outward unit normals at these points, shape (n, 3).
-        vertices: Vertices of the closed meshes of its parts, shape (m, 3) [m]; empty if only the surface is known.
+        normals: Outward unit normals at the points, shape (n, 3).
+        vertices: Vertices of the closed meshes of the object's parts, shape (m, 3) [m]; empty if only the surface is
+            known.
         triangles: Vertex indices, counter-clockwise seen from outside, shape (k, 3).
     """
 
@@ -36,7 +37,7 @@ class Gripper:
         max_opening: Maximum free width between the pads [m].
         pad_width: Size of a pad across the closing and approach directions [m].
         pad_height: Size of a pad along the approach direction [m].
-        fingertip: Maximum distance of the fingertips from the centre between the pads, along the approach [m].
+        fingertip: Maximum distance from the centre between the pads to the fingertips, along the approach [m].
     """
 
     max_opening: float
@@ -63,9 +64,9 @@ class CameraView:
     """Registered depth and colour images of a camera.
 
     Attributes:
-        depth: Depths along the optical axis, shape (h, w) [m]; NaN without a measurement.
-        colour: Colours red, green, blue, shape (h, w, 3), uint8.
-        intrinsics: Camera matrix of the images without distortion, shape (3, 3) [pixel].
+        depth: Depths along the optical axis, shape (h, w) [m]; NaN for pixels without a measurement.
+        colour: RGB colours, shape (h, w, 3), uint8.
+        intrinsics: Camera matrix, shape (3, 3) [pixel]; the images have no lens distortion.
         pose: Pose of the optical frame (x right, y down, z forward) in the frame of the request, shape (4, 4) [m].
     """
 
@@ -75,7 +76,7 @@ class CameraView:
     pose: np.ndarray
 
     def points(self) -> np.ndarray:
-        """Returns the point of each pixel in the frame of the request, shape (h, w, 3) [m]; NaN without a depth."""
+        """Returns the point of each pixel in the frame of the request, shape (h, w, 3) [m]; NaN for unknown depths."""
         rows, columns = np.indices(self.depth.shape)
         pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
         rays = pixels @ np.linalg.inv(self.intrinsics).T
@@ -91,10 +92,10 @@ class GraspRequest:
         target: Object to grasp.
         obstacles: All other objects of the scene.
         support_z: Height of the surface that supports the target [m].
-        gripper: The hand.
+        gripper: Dimensions of the hand.
         robot: Joint positions of the robot.
         seed: Seed of all random numbers.
-        camera: Images of the scene; None unless the method requires them (`grasp_method(camera=True)`).
+        camera: Camera images of the scene; None unless the method requires them (`grasp_method(camera=True)`).
     """
 
     frame: str

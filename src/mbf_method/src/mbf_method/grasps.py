@@ -15,7 +15,7 @@ from mbf_method.grasp_request import GraspRequest
 ITEM_SHAPES = {"poses": (4, 4), "scores": (), "widths": ()}
 """Shape of one grasp in each array."""
 ROTATION_TOLERANCE = 1e-3
-"""Maximum error of an element of R^T R; single-precision rotations are accurate to 1e-6."""
+"""Maximum deviation of an element of R^T R from the identity; single-precision rotations are accurate to 1e-6."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Grasps:
     """Grasps of an object, in any order.
 
     Attributes:
-        frame: Frame of the poses, the frame of the request.
+        frame: Frame of the poses; must be the frame of the request.
         poses: Poses of the hand, shape (n, 4, 4) [m]. The origin is the centre between the closed pads; x is the
             closing direction, z the approach direction.
         scores: Scores in [0, 1], shape (n,); higher is better.
@@ -37,15 +37,15 @@ class Grasps:
 
 
 def checked_grasps(message: Mapping[str, Any], request: GraspRequest, max_grasps: int) -> Grasps:
-    """Returns the grasps of a result.
+    """Checks a result and returns its grasps.
 
     Args:
-        message: Fields of `Grasps` by name.
-        request: Request of the result.
+        message: Fields of `Grasps`, keyed by name.
+        request: Request to which the result belongs.
         max_grasps: Maximum number of grasps.
 
     Raises:
-        InvalidOutputError: The result has wrong names, shapes, values or frames; the message lists all faults.
+        InvalidOutputError: A field name, shape, value or frame is invalid; the message lists all faults.
     """
     names = [field.name for field in dataclasses.fields(Grasps)]
     if sorted(message) != sorted(names):

@@ -29,12 +29,12 @@ from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
 RETRY_PERIOD_S = 0.05
 EXIT_TIMEOUT_S = 2.0
-"""Maximum wait for the exit code of a process that has closed its connection [s]."""
+"""Maximum wait for the exit code after a process has closed its connection [s]."""
 
 
 @dataclass(frozen=True)
 class MethodSource:
-    """Where a method runs; exactly one of command and address is set.
+    """Location of a method: either a command or an address must be set.
 
     Attributes:
         command: Program and arguments that start the method.
@@ -47,7 +47,7 @@ class MethodSource:
 
 @dataclass(frozen=True)
 class MethodLimits:
-    """Limits of a method.
+    """Time and size limits of a method.
 
     Attributes:
         start_s: Maximum time from the start of the command until the method is ready [s].
@@ -62,11 +62,11 @@ class MethodLimits:
 
 @dataclass(frozen=True)
 class CallTimes:
-    """Durations of a call, whose sum is the time from request to result [s].
+    """Durations of a call [s]; their sum is the time from the request to the result.
 
     Attributes:
-        method_s: Duration of the method's function, measured in its process.
-        queue_s: Wait for other requests, measured in its process.
+        method_s: Duration of the method's function, measured in the method's process.
+        queue_s: Wait for other requests, measured in the method's process.
         transport_s: Remaining time: encoding, transfer and decoding.
     """
 
@@ -80,7 +80,7 @@ class MethodResult:
     """Result of a call.
 
     Attributes:
-        message: Fields of the result by name, unchecked.
+        message: Unchecked fields of the result, keyed by name.
         times: Durations of the call.
     """
 
@@ -89,15 +89,15 @@ class MethodResult:
 
 
 class MethodClient:
-    """Starts a method or connects to it, and calls it. After a fault, the next call starts or connects again.
+    """Starts or connects to a method, and sends requests. After a fault, the next call starts or connects again.
 
     Attributes:
-        needs_camera: Whether requests must contain images of a camera; known after `start`.
+        needs_camera: Whether requests must contain camera images; known after `start`.
 
     Args:
-        source: Where the method runs.
+        source: Location of the method.
         kind: Required kind of the method.
-        limits: Limits of the method.
+        limits: Time and size limits.
     """
 
     def __init__(self, source: MethodSource, kind: str, limits: MethodLimits) -> None:
@@ -109,10 +109,10 @@ class MethodClient:
         self.needs_camera = False
 
     def start(self) -> None:
-        """Starts the method or connects to it, unless it is ready.
+        """Starts the method or connects to its address; no effect while connected.
 
         Raises:
-            MethodError: The method is not ready within its time limit, or has another kind or version.
+            MethodError: The method is not ready within its time limit, or its kind or version is wrong.
         """
         if self._connection is not None:
             return
@@ -133,7 +133,7 @@ class MethodClient:
             request: Dataclass with the inputs.
 
         Raises:
-            MethodError: The method returns no result; the class tells the kind of fault.
+            MethodError: The method returns no result; the class of the error is the kind of fault.
         """
         self.start()
         started_s = time.perf_counter()
@@ -155,7 +155,7 @@ class MethodClient:
         return MethodResult(result, CallTimes(method_s, queue_s, max(0.0, total_s - method_s - queue_s)))
 
     def close(self) -> None:
-        """Closes the connection, and ends the process if this client has started it."""
+        """Closes the connection, and ends the process that this client started."""
         connection, process = self._connection, self._process
         self._connection = self._process = None
         if connection is not None:
@@ -164,7 +164,7 @@ class MethodClient:
             process.close()
 
     def _connect(self, address: str) -> ClientConnection:
-        """Connects to the method as soon as it listens, and checks kind and version."""
+        """Connects as soon as the method listens, and checks the kind and the version."""
         deadline_s = time.monotonic() + self._limits.start_s
         while True:
             left_s = max(RETRY_PERIOD_S, deadline_s - time.monotonic())
@@ -231,7 +231,7 @@ class MethodClient:
 
 @contextmanager
 def _deadline(connection: ClientConnection, limit_s: float) -> Iterator[threading.Event]:
-    """Shuts a connection down after a time limit, and sets the event; this ends waits in `send` and `recv`."""
+    """Shuts down a connection after a time limit and sets the event; the shutdown ends waits in `send` and `recv`."""
     expired = threading.Event()
 
     def expire() -> None:
@@ -248,6 +248,6 @@ def _deadline(connection: ClientConnection, limit_s: float) -> Iterator[threadin
 
 
 def _shut_down(connection: ClientConnection) -> None:
-    """Ends a connection without the closing handshake, to which a hanging method does not respond."""
+    """Ends a connection without the closing handshake, because a hanging method would not respond."""
     with suppress(OSError):
         connection.socket.shutdown(socket.SHUT_RDWR)

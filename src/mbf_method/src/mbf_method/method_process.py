@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Starts a method's command in its own Python environment, and ends it with all its children."""
+"""Starts the process of a method in its own Python environment, and ends the process with all its children."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mbf_method.errors import MethodStartError
 from mbf_method.served_method import PORT_VARIABLE
 
 PRIVATE_VARIABLES = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
-"""Variables of the framework's Python environment, which would make its packages shadow those of the method."""
+"""Environment variables with which the framework's packages would shadow the method's packages."""
 END_TIMEOUT_S = 2.0
 
 
@@ -43,10 +43,10 @@ class MethodProcess:
             raise MethodStartError(f"'{self._command}' cannot be started: {error}; correct the command") from error
 
     def end_text(self, timeout_s: float = 0.0) -> str:
-        """Returns how the process ended; "" if it still runs.
+        """Returns the exit status as text; "" while the process runs.
 
         Args:
-            timeout_s: Maximum wait for the end [s].
+            timeout_s: Maximum wait for the end of the process [s].
         """
         try:
             code = self._process.wait(timeout_s)
@@ -63,7 +63,7 @@ class MethodProcess:
         self._process.wait()
 
     def _send_signal(self, number: signal.Signals) -> None:
-        """Sends a signal to the process and its children; a method that has ended needs none."""
+        """Sends a signal to the process and its children; no effect after their end."""
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, number)
 

@@ -19,7 +19,7 @@ from mbf_method.grasps import Grasps
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
 PORT_VARIABLE = "MBF_METHOD_PORT"
-"""Environment variable with the port that the framework chose for a method that it starts."""
+"""Environment variable with the port that the framework chooses when it starts a method."""
 DEFAULT_PORT = 8700
 MAX_REQUEST_BYTES = 1 << 28
 PARENT_PERIOD_S = 1.0
@@ -32,14 +32,14 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ServedMethod:
-    """Function of a method, which is called directly or served to the framework.
+    """Function of a method, for direct calls or for calls by the framework.
 
     Attributes:
         function: The function.
         kind: Kind of the method.
-        read_request: Creates the argument of the function from a decoded message.
+        read_request: Function that creates the argument of `function` from a decoded message.
         result_type: Class of the result.
-        needs_camera: Whether requests must contain images of a camera.
+        needs_camera: Whether requests must contain camera images.
     """
 
     function: Callable[[Any], Any]
@@ -66,8 +66,8 @@ class ServedMethod:
     def serve(self, port: int = DEFAULT_PORT, host: str = "127.0.0.1") -> None:
         """Serves the function until the process is interrupted.
 
-        Requests are processed one after another. A process that the framework started uses the port that the framework
-        chose, and ends with the framework's process.
+        The method processes one request at a time. If the framework started this process, the framework also chose the
+        port, and this process ends with the framework's process.
 
         Args:
             port: TCP port.
@@ -81,7 +81,7 @@ class ServedMethod:
             handler.handle,
             host,
             port,
-            origins=[None],  # refuses pages of a browser, which always state an origin
+            origins=[None],  # refuses browsers, which always send an Origin header
             compression=None,
             max_size=MAX_REQUEST_BYTES,
         ) as server:
@@ -102,8 +102,8 @@ def grasp_method(
     """Decorates a function that returns the grasps of an object; `ServedMethod.serve` serves the function.
 
     Args:
-        function: The function, for a decorator without arguments.
-        camera: Whether the function needs the images of a camera.
+        function: Decorated function; None for a decorator with arguments.
+        camera: Whether the function needs camera images.
     """
 
     def decorate(grasp_function: GraspFunction) -> ServedMethod:
@@ -138,7 +138,7 @@ class _Handler:
             logger.warning("the connection was closed: %s", closed)
 
     def _response(self, data: str | bytes, received_s: float) -> str | bytes:
-        """Returns the encoded result, or the traceback as text, as servers of openpi do."""
+        """Returns the encoded result, or the traceback as text, like openpi's servers."""
         try:
             with self._turn:
                 started_s = time.perf_counter()
@@ -148,13 +148,13 @@ class _Handler:
                 ended_s = time.perf_counter()
             timing = {"infer_ms": 1e3 * (ended_s - called_s), "queue_ms": 1e3 * (started_s - received_s)}
             return pack({"result": result, "server_timing": timing})
-        except Exception:  # whatever the method raises is its result
+        except Exception:  # any exception of the method becomes the response
             logger.exception("%s failed", self._method.function.__name__)
             return traceback.format_exc()
 
 
 def _end_with_parent(parent: int) -> None:
-    """Ends this process when its parent has ended, even while the function of the method runs."""
+    """Ends this process after the end of its parent, even while the method's function runs."""
     while os.getppid() == parent:
         time.sleep(PARENT_PERIOD_S)
     os._exit(1)

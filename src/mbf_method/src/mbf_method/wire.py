@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts messages to bytes and back: msgpack, with NumPy arrays encoded as by openpi-client."""
+"""Converts messages to msgpack bytes and back; NumPy arrays have the encoding of openpi-client."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PROTOCOL = "mbf_method"
 VERSION = 1
 """Version of the messages; method and framework must have the same version."""
 REFUSED_KINDS = "VOc"
-"""Kinds of array elements without an encoding: structures, Python objects, complex numbers."""
+"""NumPy dtype kinds without an encoding: structures, Python objects, complex numbers."""
 
 
 def pack(message: Any) -> bytes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages about a task, as plain values: machines and their active states (smach), reports of the task, log lines."""
+"""Messages about a task as dataclasses without ROS: smach machines, task reports and log lines."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class MachineStructure:
 
     Attributes:
         path: Path of the container, such as "/task/Pick".
-        children: Labels of its states, in order.
-        transitions: Transitions; of a concurrence, the entries of the outcome map.
-        outcomes: Outcomes of the container, the last for failure.
+        children: Labels of the container's states, in order.
+        transitions: Transitions of a state machine, or entries of the outcome map of a concurrence.
+        outcomes: Outcomes of the container; the last outcome means failure.
     """
 
     path: str
@@ -37,7 +37,7 @@ class MachineStatus:
 
     Attributes:
         path: Path of the container.
-        initial: Labels of the initial states; several for a concurrence.
+        initial: Labels of the initial states; a concurrence has several initial states.
         active: Labels of the running states; empty if the container does not run.
     """
 
@@ -48,19 +48,19 @@ class MachineStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskReport:
-    """A message of the topic `task_status`.
+    """Message of the topic `task_status`.
 
     Attributes:
         task: Name of the task.
         event: "start" or "end" of a state, "running", or "task_end".
-        state: Path of the state without the task; "" at the end of the task.
+        state: Path of the state, relative to the task; "" at the end of the task.
         active: Paths of the running states.
         elapsed_s: Time since the start of the task [s].
         state_elapsed_s: Time since the start of the state [s].
         outcome: Outcome of the state or of the task; "" while running or after an exception.
         reason: Reason of a failure; "" without a failure.
-        succeeded: Whether the task succeeded; False before its end.
-        feedback: Current activities, keyed by path of the state.
+        succeeded: Whether the task succeeded; False before the end of the task.
+        feedback: Current activities, keyed by state path.
     """
 
     task: str
@@ -130,12 +130,12 @@ def read_report(text: str) -> TaskReport:
 def machine_frame(
     root: str, structures: dict[str, MachineStructure], initial: dict[str, tuple[str, ...]]
 ) -> MachineFrame:
-    """Returns a machine with its nested machines, for drawing.
+    """Returns the frame that represents a machine and its nested machines in the drawing.
 
     Args:
         root: Path of the machine.
-        structures: Structures of the containers, keyed by path.
-        initial: Labels of the initial states, keyed by path of the container.
+        structures: Structures of the containers, keyed by container path.
+        initial: Labels of the initial states, keyed by container path.
     """
     structure = structures[root]
     children: list[StateBox | MachineFrame] = []

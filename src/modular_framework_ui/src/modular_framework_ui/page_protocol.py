@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages from the server to the page, as JSON; `web/page.js` reads them.
 
-Each message has the changes since the previous message of the connection, and the first message has everything. Times
-are seconds of the server's clock; `now_s` is the time of the message.
+The first message of a connection contains the whole state of the task. Each later message contains the changes since
+the previous message. Times are in seconds of the server's clock; `now_s` is the time of the message.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from modular_framework_ui.task_state import TaskChanges
 
 
 def changes_text(changes: TaskChanges) -> str:
-    """Returns the message for some changes.
+    """Returns the changes as a JSON message.
 
-    The keys are those of `TaskChanges`, except `revision`. The values of `runs` and `log` are lists of entries with the
-    additional key `index`.
+    The keys are the fields of `TaskChanges` except `revision`. The values of `runs` and `log` are lists of entries with
+    the additional key `index`.
     """
     values: dict[str, Any] = {
         "now_s": changes.now_s,

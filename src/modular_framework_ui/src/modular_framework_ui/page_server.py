@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Web server of the page: its files over HTTP, and the state of the task over a WebSocket.
+"""Web server of the page: files over HTTP, and the state of the task over a WebSocket.
 
-A slow browser delays nobody: each connection receives the changes since its own last message, whenever it has sent
-that message, so that changes in between arrive together.
+A slow browser does not delay the node or other browsers. After a message is sent, the next message of the connection
+contains all changes since then.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ FILES = {
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
 }
-"""Name and type of each file, keyed by path; no other file is served."""
+"""File name and MIME type, keyed by URL path; the server serves no other files."""
 MIN_PERIOD_S = 1 / 30
 """Minimum time between two messages of a connection [s]."""
 MAX_REQUEST_BYTES = 1024
 START_TIMEOUT_S = 10.0
 _READ_ONLY = 1008
-"""Code with which a WebSocket is closed whose page sends something."""
+"""WebSocket close code for a page that sends a message."""
 
 
 class PageServer:
-    """Serves the page in a thread of its own. The page cannot change anything.
+    """Serves the read-only page in a separate thread.
 
     Args:
         folder: Folder with the files of the page.
@@ -68,7 +68,7 @@ class PageServer:
         return f"http://{host}:{self.port}/{self._access.token}/"
 
     def start(self) -> None:
-        """Starts to serve the page.
+        """Starts the server.
 
         Raises:
             OSError: The server cannot listen at its address, or does not start in time.
@@ -80,12 +80,12 @@ class PageServer:
             raise self._fault
 
     def notify(self) -> None:
-        """Has the changes sent to all pages; may be called by any thread, and waits for no page."""
+        """Wakes all connections so that they send the changes. Thread-safe; does not wait for browsers."""
         with contextlib.suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._set_changed)
 
     def close(self) -> None:
-        """Stops the server, whatever the browsers do. May be called twice."""
+        """Stops the server without waiting for browsers. May be called twice."""
         self._connections.close(self._loop)
         with contextlib.suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._ended.set)
@@ -102,7 +102,7 @@ class PageServer:
             self._loop.close()
 
     async def _serve(self) -> None:
-        create_connection: Any = self._connections.create_connection  # serve is annotated with a class, and calls it
+        create_connection: Any = self._connections.create_connection  # annotated as a class; any factory works
         async with serve(
             self._send_changes,
             self.host,
@@ -137,7 +137,7 @@ class PageServer:
         return Response(200, "OK", Headers(headers), content)
 
     async def _send_changes(self, connection: ServerConnection) -> None:
-        """Sends the changes until the page goes away."""
+        """Sends changes until the page disconnects."""
         changed = asyncio.Event()
         changed.set()
         self._changed.add(changed)
@@ -159,11 +159,11 @@ class PageServer:
 
 
 async def _refuse_messages(connection: ServerConnection, changed: asyncio.Event) -> None:
-    """Closes the connection of a page that sends something.
+    """Closes the connection if the page sends a message.
 
     Args:
         connection: Connection of the page.
-        changed: Event that is set at the end of the connection, for which the sender waits.
+        changed: Event for which the sender waits; set at the end of the connection.
     """
     try:
         await connection.recv()
@@ -175,7 +175,7 @@ async def _refuse_messages(connection: ServerConnection, changed: asyncio.Event)
 
 
 def _content_policy(host: str) -> str:
-    """Returns the content security policy: own files only, and frames of this computer for the view of the world."""
+    """Returns the content security policy: files of this server, and frames of this computer for the world view."""
     name = host.rpartition(":")[0]
     frames = " ".join(f"http://{each}:*" for each in (name, "localhost", "127.0.0.1"))
     return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A bounded list whose changed entries can be asked for, so that a page receives each change once."""
+"""Bounded list that returns the entries changed since a revision, so that a page receives each change once."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ Entry = TypeVar("Entry")
 
 
 class RevisedEntries(Generic[Entry]):
-    """Entries with consecutive indices and the revision of their last change. Indices are never used twice.
+    """Entries with consecutive indices and the revision of their last change. Indices are never reused.
 
     Args:
-        max_entries: Maximum number of entries; the oldest are dropped first.
+        max_entries: Maximum number of entries; a new entry replaces the oldest entry of a full list.
     """
 
     def __init__(self, max_entries: int) -> None:

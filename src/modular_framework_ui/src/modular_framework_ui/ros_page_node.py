@@ -26,7 +26,7 @@ _LOG_PERIOD_S = 10.0
 
 
 class PageNode:
-    """Keeps the state of the task from the start of the node, so that a page can be opened at any time.
+    """Records the task from the start of the node, so that a page can be opened at any time.
 
     Parameters: see `parameters/page.yaml`. Subscribers: see `TaskTopics`.
 
@@ -71,7 +71,7 @@ class PageNode:
         self._server.notify()
 
     def _draw_always(self) -> None:
-        """Draws the state machine after each change of it; body of a thread, because Graphviz takes up to a second."""
+        """Draws the changed state machine; runs in a separate thread, because Graphviz takes up to a second."""
         while True:
             self._changed.wait()
             self._changed.clear()
@@ -95,7 +95,7 @@ def main() -> int:
     Returns:
         Exit code: 0 after a regular shutdown, 1 if the page cannot be served.
     """
-    # Without simulated time, the page continues while time is paused.
+    # With real time, the page keeps running while simulated time is paused.
     rospy.init_node(_NODE, disable_rostime=True)
     read = DeclaredParameters("modular_framework_ui", _NODE).values
     try:

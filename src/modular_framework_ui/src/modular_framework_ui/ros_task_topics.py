@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Feeds a task model from ROS topics: state machines of any node, reports of run_task, the log, the viewer."""
+"""Feeds a task model from ROS topics: state machines of any node, reports of run_task, log lines, viewer address."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEVELS = {Log.WARN: "WARN", Log.ERROR: "ERROR", Log.FATAL: "FATAL"}
 
 
 class MachineFeed:
-    """Subscriptions to one introspection server.
+    """Subscriptions to an introspection server.
 
     Args:
         server: Prefix of the server's topics.
@@ -36,13 +36,13 @@ class MachineFeed:
         self._statuses = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, self._note_status)
 
     def check(self) -> None:
-        """Tells the model if the server has gone, also if its process was killed."""
+        """Notifies the model of a server that has ended or whose process was killed."""
         if self._was_heard and not _is_connected(self._statuses):
             self._was_heard = False
             self._note_lost()
 
     def close(self) -> None:
-        """Ends the subscriptions, and tells the model that the server has gone."""
+        """Unsubscribes, and notifies the model that the server has ended."""
         self._structures.unregister()
         self._statuses.unregister()
         self._note_lost()
@@ -72,7 +72,7 @@ class MachineFeed:
             MachineStatus(
                 path=message.path,
                 initial=tuple(message.initial_states),
-                active=tuple(label for label in message.active_states if label != "None"),  # public smach, before a run
+                active=tuple(label for label in message.active_states if label != "None"),  # public smach: not started
             )
         )
 
@@ -98,7 +98,7 @@ class TaskTopics:
         self._log = rospy.Subscriber("/rosout_agg", Log, self._note_log)
 
     def search(self) -> None:
-        """Follows the state machines that appear and disappear. Call the method repeatedly."""
+        """Subscribes to new state machines and unsubscribes from ended state machines; must be called periodically."""
         published = {
             name.removesuffix(STATUS_TOPIC)
             for name, kind in rospy.get_published_topics()

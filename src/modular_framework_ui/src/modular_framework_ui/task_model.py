@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The state of a task so far, from the messages about the task; a page that opens late gets all of it.
+"""State and history of a task, built from messages about the task; a page that opens late receives the whole history.
 
-The topics of smach show which states run, for any smach state machine. A task that `run_task` runs also reports the
-outcome and the reason of each state. These reports then give the runs of its states, and smach gives the runs of its
-machines.
+The smach topics of any state machine show which states run. `run_task` also reports the outcome and the reason of each
+state of its task. The model takes the runs of these states from the reports, and the runs of machines from the smach
+topics.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from modular_framework_ui.task_state import Phase, StateRun, TaskChanges, TaskSu
 MAX_RUNS = 2000
 MAX_LOG_LINES = 500
 RESTART_S = 1.0
-"""Decrease of the elapsed time that shows a new start [s]; reports of two threads overtake each other by less."""
+"""Minimum decrease of the elapsed time at a restart [s]; messages of two threads are out of order by less."""
 
 
 class TaskModel:
-    """Collects the messages about the task that started last. All methods may be called by any thread.
+    """Collects the messages about the latest task. All methods are thread-safe.
 
     Args:
         clock: Function that returns the time [s].
@@ -48,7 +48,7 @@ class TaskModel:
 
     # ---- messages ------------------------------------------------------------------------------------------------
     def note_structure(self, structure: MachineStructure) -> None:
-        """Takes the structure of a container."""
+        """Records the structure of a container."""
         with self._lock:
             path = structure.path
             if self._structures.get(path) == structure:
@@ -63,7 +63,7 @@ class TaskModel:
             self._changed()
 
     def note_status(self, status: MachineStatus) -> None:
-        """Takes the active states of a container."""
+        """Records the active states of a container."""
         with self._lock:
             previous = self._statuses.get(status.path)
             if previous == status:
@@ -78,27 +78,27 @@ class TaskModel:
             self._changed()
 
     def note_report(self, report: TaskReport) -> None:
-        """Takes a report of a task."""
+        """Records a report of a task."""
         root = report.root
         with self._lock:
             start_s = self._clock() - report.elapsed_s
             last = self._last_reports.get(root)
             if report == last:
-                return  # sent again to a subscriber that connects again
+                return  # latched, and received again after a reconnection
             is_restarted = last is not None and report.elapsed_s < last.elapsed_s - RESTART_S
             is_first = last is None or report.event == "start"
             if is_restarted or (is_first and not self._is_running(root)):
                 self._start_task(root, start_s)
             elif self._task.root != root:
                 return
-            elif last is None:  # smach showed the task first, and later than it started
+            elif last is None:  # smach announced the task after its start
                 self._task = replace(self._task, start_s=min(start_s, self._task.start_s))
             self._last_reports[root] = report
             self._apply(report)
             self._changed()
 
     def note_log(self, level: str, node: str, text: str) -> None:
-        """Takes a line of the ROS log.
+        """Records a line of the ROS log.
 
         Args:
             level: "WARN", "ERROR" or "FATAL".
@@ -110,7 +110,7 @@ class TaskModel:
             self._changed()
 
     def note_lost_machine(self, path: str) -> None:
-        """Takes the end of the node that published a machine; no change if its task had ended."""
+        """Records the end of the node that published a machine; no effect after the end of the task."""
         with self._lock:
             for lost in [each for each in self._statuses if each == path or each.startswith(f"{path}/")]:
                 del self._statuses[lost]
@@ -119,13 +119,13 @@ class TaskModel:
                 self._changed()
 
     def note_drawing(self, svg: str) -> None:
-        """Takes the drawing of the state machine."""
+        """Records the drawing of the state machine."""
         with self._lock:
             self._drawing, self._drawing_revision = svg, self._revision + 1
             self._changed()
 
     def note_viewer(self, address: str) -> None:
-        """Takes the address of the page that shows the world; "" if there is none."""
+        """Records the address of the page that shows the world; "" without a viewer."""
         with self._lock:
             self._viewer = address
             self._changed()
@@ -139,7 +139,7 @@ class TaskModel:
             return machine_frame(self._task.root, self._structures, self._initial)
 
     def changes_since(self, revision: int) -> TaskChanges:
-        """Returns what changed after a revision; everything after revision 0."""
+        """Returns the changes after a revision; revision 0 returns the whole state."""
         with self._lock:
             return TaskChanges(
                 revision=self._revision,
@@ -159,7 +159,7 @@ class TaskModel:
 
     # ---- tasks and runs ------------------------------------------------------------------------------------------
     def _root_of(self, path: str) -> str:
-        """Returns the path of the outermost known machine around a path."""
+        """Returns the path of the outermost known machine that contains a path."""
         around = [each for each in self._structures if path == each or path.startswith(f"{each}/")]
         return min(around, key=len, default=path)
 
@@ -167,7 +167,7 @@ class TaskModel:
         return self._task.root == root and self._task.phase is Phase.RUNNING
 
     def _is_startable(self, root: str) -> bool:
-        """Returns whether smach alone starts a task: not for a task that reports, nor beside a running task."""
+        """Returns whether a smach status may start a task: False for a task with reports, or during another task."""
         return root not in self._last_reports and self._task.phase is not Phase.RUNNING
 
     def _start_task(self, root: str, start_s: float) -> None:
@@ -192,14 +192,14 @@ class TaskModel:
         return next(((index, run) for index, run in self._runs.newest_first() if run.path == path), None)
 
     def _open(self, path: str, start_s: float) -> None:
-        """Starts a run of a state, unless the state runs."""
+        """Starts a run of a state, unless the state already runs."""
         last = self._last_run(path)
         if last is None or last[1].end_s is not None:
             run = StateRun(path=path, start_s=start_s, is_machine=path in self._structures)
             self._runs.add(run, self._revision + 1)
 
     def _with_machine_outcome(self, run: StateRun) -> StateRun:
-        """Returns the ended run of a machine with its outcome, if the last state of the machine tells it."""
+        """Returns the ended run of a machine with its outcome; "" unless the last state determines the outcome."""
         structure = self._structures.get(run.path)
         if structure is None or run.outcome:
             return run
@@ -223,7 +223,7 @@ class TaskModel:
             self._end_without_report(now_s)
 
     def _is_followed(self, path: str) -> bool:
-        """Returns whether smach gives the runs of a state: those of machines, and all of a task without reports."""
+        """Returns whether smach determines the runs of a state: True for machines, and in tasks without reports."""
         return self._task.root not in self._last_reports or path in self._structures
 
     def _ended_by_smach(self, run: StateRun, status: MachineStatus, end_s: float) -> StateRun:
@@ -235,7 +235,7 @@ class TaskModel:
         return _with_outcome(ended, outcome, self._structures.get(run.path))
 
     def _end_without_report(self, now_s: float) -> None:
-        """Ends a task of which only smach tells."""
+        """Ends a task without reports."""
         machine = StateRun(path=self._task.root, start_s=self._task.start_s, end_s=now_s)
         structure, outcome = self._structures.get(self._task.root), self._with_machine_outcome(machine).outcome
         phases: dict[str, Phase] = {}
@@ -270,12 +270,12 @@ class TaskModel:
         ended = replace(last[1], end_s=end_s, outcome=report.outcome, reason=report.reason, has_failed=has_failed)
         self._set(last[0], ended)
         machine = self._last_run(_machine_of(path))
-        if machine is not None and machine[1].end_s is not None:  # smach showed the end of the machine first
+        if machine is not None and machine[1].end_s is not None:  # smach was faster than the report
             self._set(machine[0], self._with_machine_outcome(machine[1]))
 
 
 def _with_outcome(run: StateRun, outcome: str, structure: MachineStructure | None) -> StateRun:
-    """Returns a run with its outcome. A machine fails with its last outcome; smach tells no reason."""
+    """Returns a run with its outcome. The last declared outcome of a machine means failure; smach has no reasons."""
     has_failed = structure is not None and len(structure.outcomes) > 1 and outcome == structure.outcomes[-1]
     return replace(run, outcome=outcome, has_failed=has_failed, is_machine=structure is not None)
 

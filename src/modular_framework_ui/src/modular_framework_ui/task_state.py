@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page shows of a task: the task as a whole, the runs of its states, log lines, and changes of these."""
+"""Values that the page shows: summary of the task, runs of states, log lines, and changes of these values."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ class Phase(Enum):
     SUCCEEDED = "succeeded"
     FAILED = "failed"
     ENDED = "ended"
-    """The task ended, and its topics do not tell whether it succeeded."""
+    """The task ended; the topics of the task do not state success or failure."""
     LOST = "lost"
     """The node of the task ended before the task."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskSummary:
-    """A task as a whole. Times are those of the model's clock.
+    """Summary of a task. Times are readings of the model's clock.
 
     Attributes:
         number: Index of the task, from 1; 0 before the first task.
-        root: Path of its machine; "" before the first task.
+        root: Path of the machine of the task; "" before the first task.
         phase: Phase of the task.
         start_s: Start time [s].
         end_s: End time [s]; None before the end.
         outcome: Outcome; "" before the end or if unknown.
         reason: Reason of a failure; "" without a failure.
-        feedback: Current activities, keyed by path of the state.
+        feedback: Current activities, keyed by state path.
     """
 
     number: int = 0
@@ -49,7 +49,7 @@ class TaskSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateRun:
-    """One execution of a state or of a nested machine.
+    """Execution of a state or of a nested machine.
 
     Attributes:
         path: Path of the state, such as "/task/Pick/Close".
@@ -72,18 +72,18 @@ class StateRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskChanges:
-    """Everything that changed since a revision of the model.
+    """Changes since a revision of the model.
 
     Attributes:
         revision: Current revision.
         now_s: Current time [s].
-        task: The task as a whole.
+        task: Summary of the task.
         drawing: SVG of the state machine; None if unchanged.
-        viewer: Address of the page that shows the world; "" if there is none.
+        viewer: Address of the page that shows the world; "" without a viewer.
         runs: Changed runs, keyed by index.
-        oldest_run: Index of the oldest run that is kept.
+        oldest_run: Index of the oldest kept run.
         log: New log lines, keyed by index.
-        oldest_line: Index of the oldest log line that is kept.
+        oldest_line: Index of the oldest kept log line.
     """
 
     revision: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts the query of a generator to the request of an external method, and its grasps to candidates."""
+"""Converts a generator query to a request, and the grasps of an external method to candidates."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def grasp_request(query: GraspQuery, frame: str, robot: RobotState, camera: Came
     """Returns the request for the grasps of an object.
 
     Args:
-        query: Object to grasp, with its surroundings.
+        query: Object to grasp, obstacles and gripper.
         frame: Planning frame, the frame of all coordinates.
         robot: Joint positions of the robot.
-        camera: Images of the scene, for a method that needs them.
+        camera: Camera images of the scene; None if the method needs no images.
     """
     gripper = query.gripper
     return GraspRequest(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Receives the images of a camera on demand, with its model and its pose."""
+"""Receives camera images on demand, with the matrix and the pose of the camera."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from modular_framework_ros.camera_images import colour_array, depth_array
 DEPTH_PARAMETER, COLOUR_PARAMETER = "depth_image_topic_name", "rgb_image_topic_name"
 """Parameters of sensors_config.yaml with the topics of a camera."""
 TRANSFORM_TIMEOUT_S = 5.0
-"""Maximum wait for the transform at the time of an image [s of real time]; only a failure takes as long."""
+"""Maximum wait for the transform at the time of an image [s of real time]; only a failure takes this long."""
 
 
 class CameraSource:
     """Receives images; subscribes to the camera only while waiting.
 
     Parameters: ``depth_image_topic_name``, ``rgb_image_topic_name``.
-    Subscribers: both topics (sensor_msgs/Image) and ``camera_info`` in the namespace of the depth image
-        (sensor_msgs/CameraInfo); permanently, the topics of :class:`Transforms`.
+    Subscribers, while waiting: both image topics (sensor_msgs/Image) and ``camera_info`` in the namespace of the depth
+        image (sensor_msgs/CameraInfo). Permanent subscribers: those of :class:`Transforms`.
     """
 
     def __init__(self) -> None:
-        """Creates the source without any subscription, see :meth:`connect`."""
+        """Creates the source without subscriptions; :meth:`connect` subscribes to TF."""
         self._transforms = Transforms()
         self._messages = FreshMessages()
         self._is_connected = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ROS node of an external method: its parameters, its inputs, and its grasps as candidates."""
+"""ROS node of an external method: reads parameters, collects inputs and returns the grasps as candidates."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class ExternalSettings:
     """Parameters that determine the method and its limits.
 
     Attributes:
-        source: Where the method runs (``~command``, ``~address``).
-        limits: Limits of time and size (``~start_limit``, ``~time_limit``, ``~size_limit``).
+        source: Location of the method (``~command``, ``~address``).
+        limits: Time and size limits (``~start_limit``, ``~time_limit``, ``~size_limit``).
     """
 
     source: MethodSource
@@ -67,7 +67,7 @@ class ExternalSettings:
 
 
 class ExternalMethod(ParameterisedMethod):
-    """Grasps of a function in its own process, which this class starts or connects to.
+    """Grasp method that calls a function in another process, which this class starts or connects to.
 
     A fault of the method ends the generation. The next generation starts the method again.
 
@@ -102,7 +102,7 @@ class ExternalMethod(ParameterisedMethod):
 
         Raises:
             MethodFaultError: The method did not return a valid result; the message gives the cause.
-            NoCandidatesError: The method needs a camera, which sends no images.
+            NoCandidatesError: The method needs camera images, but no images arrive.
         """
         settings, max_grasps = read_hand_motion(self.read), int(self.read("~max_candidates"))
         frame = str(rospy.get_param("origin_frame_name", "world")) if rospy.core.is_initialized() else "world"
@@ -123,7 +123,7 @@ class ExternalMethod(ParameterisedMethod):
         return candidate.quality
 
     def take_figures(self) -> dict[Figure, float]:
-        """Returns the summed durations of all calls, and the fault, since the previous call of this method."""
+        """Returns the summed call durations and the fault of the external method since the previous `take_figures`."""
         times, fault = self._times, self._fault
         self._times, self._fault = [], None
         figures: dict[Figure, float] = {} if fault is None else {METHOD_FAULT: float(fault)}
@@ -139,7 +139,7 @@ class ExternalMethod(ParameterisedMethod):
             self._client.close()
 
     def _started_client(self) -> MethodClient:
-        """Returns the started client for the present parameters, and subscribes to TF if the method needs a camera."""
+        """Returns the started client for the current parameters; subscribes to TF if the method needs a camera."""
         settings = read_external_settings(self.read)
         if self._client is None or settings != self._settings:
             self.close()
