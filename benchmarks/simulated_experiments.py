@@ -104,11 +104,11 @@ def results(world: World, drawn: Draw, **description: object) -> ExperimentResul
 def perturbed_results(
     generator: Generator, perturbations: Perturbations, rate: float, methods: int, scenes: int
 ) -> ExperimentResults:
-    """Returns a perturbed experiment whose perturbations have no effect, in the order of the scenes.
+    """Returns an experiment whose perturbations have no effect, with the episodes in the order of the scenes.
 
     Args:
         generator: Source of the draws.
-        perturbations: The axes and their levels.
+        perturbations: Axes and levels.
         rate: True success of every method at every level.
         methods: Number of methods.
         scenes: Scenes, which differ in difficulty; each runs at every level.

@@ -52,7 +52,7 @@ NULL_AXES = Perturbations(
     "one_at_a_time",
     0.5,
 )
-"""Five axes with two levels each; half of the episodes are wanted to succeed."""
+"""Five axes with two levels each; the wanted success is 50 %."""
 SHOWN = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
 
 Count = Callable[[Generator], Counter[str]]
@@ -230,15 +230,16 @@ def regression(generator: Generator, world: World, pairs: int, same_seeds: bool)
 
 
 def robustness(generator: Generator, methods: int, scenes: int, step: int) -> Counter[str]:
-    """Counts a perturbed experiment without any effect that shows a fall, or success below the true rate.
+    """Counts a simulated experiment without effects whose reports claim a fall, or success below the true rate.
 
-    The true success of every method at every level is the wanted success. A fixed experiment is reported repeatedly.
+    The true success of every method at every level is the wanted success. The report of an experiment with a fixed
+    number of scenes is repeated while the experiment runs.
 
     Args:
         generator: Source of the draws.
         methods: Number of methods.
         scenes: Scenes of the experiment.
-        step: Scenes from one report to the next; the number of scenes for a single report at the end.
+        step: Scenes between reports; equal to `scenes` for a single report at the end.
     """
     whole = simulate.perturbed_results(generator, NULL_AXES, NULL_AXES.wanted_success, methods, scenes)
     size = len(whole.episodes) // scenes

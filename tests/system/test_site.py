@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The documentation site: one command builds all pages, and a fault in the pages fails the build."""
+"""The documentation site: a single command builds all pages, and a fault in a page fails the build."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ BUILDER = ROOT / ".venv/site_builder"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site that the command builds."""
+    """Builds the site with the command."""
     folder = tmp_path_factory.mktemp("site")
     subprocess.run([ROOT / "install.sh", "site", "--into", folder], check=True, timeout=600)
     return folder / "html"
 
 
 def build(root: Path) -> subprocess.CompletedProcess[str]:
-    """Builds the site of another folder with pages, without the API."""
+    """Builds a site from the pages of a different folder, without the API."""
     env = {**os.environ, "PYTHONPATH": f"{BUILDER}:{os.environ.get('PYTHONPATH', '')}"}
     command = [sys.executable, ROOT / "docs/site/build_site.py", "--root", root]
     return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300, check=False)

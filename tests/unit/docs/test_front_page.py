@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The README as a front page: its figures are those of the linked pages, and its citation is that of the packages."""
+"""The front page (README): its figures match the linked pages, and its citation matches the packages."""
 
 from __future__ import annotations
 

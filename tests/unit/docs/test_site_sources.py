@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sources of the documentation site agree with the pages and the packages; no site is built."""
+"""The sources of the documentation site agree with the pages and the packages, without a build of the site."""
 
 from __future__ import annotations
 

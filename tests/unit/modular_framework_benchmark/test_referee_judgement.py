@@ -63,13 +63,13 @@ class WireFake:
 
     @classmethod
     def send(cls, topic: str, sender: str, text: str = "", **fields: Any) -> None:
-        """Delivers a text, or a message with the given fields, with the name of its sender."""
+        """Delivers a text or a message with the given fields, from a named sender."""
         header = {"_connection_header": {"callerid": sender}}
         cls.callbacks[topic](SimpleNamespace(**header, **(fields or {"data": text})))
 
 
 class MasterFake:
-    """A master that knows the topics of two actions besides."""
+    """A master that also knows the topics of two actions."""
 
     def __init__(self, _name: str) -> None: ...
 
@@ -104,7 +104,7 @@ def test_messages_of_another_node_than_the_topics_own_are_dropped_and_named(monk
 
 
 def ended(number: str) -> dict[str, Any]:
-    """The fields of a result that says that a goal succeeded."""
+    """The fields of the result of a goal that succeeded."""
     result = ExecuteTrajectoryActionResult()
     result.status.goal_id.id, result.status.status, result.result.error_code.val = number, ros_samples.SUCCEEDED, 1
     return {"header": result.header, "status": result.status, "result": result.result}

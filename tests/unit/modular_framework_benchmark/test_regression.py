@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Comparisons of two experiments: which are refused, and whose factors may have any name."""
+"""Comparisons of two experiments: refused experiments, and allowed names of factors."""
 
 from __future__ import annotations
 

@@ -212,7 +212,7 @@ def robust_sentences(found: ExperimentResults) -> str:
 
 
 def with_statuses(found: ExperimentResults, label: str, status: str, *methods: str) -> ExperimentResults:
-    """Results in which the episodes at a level have this status."""
+    """Results in which the episodes at a level have a given status."""
     episodes = found.episodes.copy()
     rows = (episodes["perturbation"] == label) & episodes["method"].isin(methods)
     episodes.loc[rows, "success"], episodes.loc[rows, "status"] = False, status

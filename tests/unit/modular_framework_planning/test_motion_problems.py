@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Problems in YAML files are planned as they are written, or refused: no name and no key is left out."""
+"""Problems in YAML files are planned exactly as written, or refused; no name or key is ignored."""
 
 from __future__ import annotations
 

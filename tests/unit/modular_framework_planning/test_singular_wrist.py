@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A singular wrist (two parallel axes) has infinitely many solutions: near ones and constrained ones are found."""
+"""A singular wrist (two parallel axes) has infinitely many solutions; near and constrained solutions are found."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of cameras become depths in metres and colours with red first, whatever their encoding."""
+"""Camera images of every encoding become depths in metres and RGB colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modular_framework_ros.camera_images import colour_array, depth_array
 
 
 def image(encoding: str, data: bytes, *, step: int, width: int = 2, big: int = 0) -> SimpleNamespace:
-    """An image of one row."""
+    """An image with a single row."""
     return SimpleNamespace(encoding=encoding, data=data, step=step, width=width, height=1, is_bigendian=big)
 
 

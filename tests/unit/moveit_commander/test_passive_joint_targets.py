@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint targets of a group with a passive joint: approximate inverse kinematics and random values leave it alone."""
+"""Approximate inverse kinematics and random joint values do not move the passive joint of a group."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LIBRARY_MODEL = pin.buildModelFromXML(urdf())
 
 
 def link_pose(link: str, values: dict[str, float]) -> pin.SE3:
-    """The pose of a link by Pinocchio, with the spring where it is."""
+    """The pose of a link by Pinocchio, with the spring at SPRING_AT."""
     positions, data = np.zeros(LIBRARY_MODEL.nq), LIBRARY_MODEL.createData()
     for name, value in {**values, SPRING: SPRING_AT}.items():
         positions[LIBRARY_MODEL.joints[LIBRARY_MODEL.getJointId(name)].idx_q] = value

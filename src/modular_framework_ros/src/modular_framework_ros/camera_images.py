@@ -24,7 +24,7 @@ MILLIMETRE_M = 1e-3
 
 
 def pixel_array(message: Any) -> npt.NDArray[Any]:
-    """Returns the pixels of an image, shape (height, width, channels), in the channels' order of the encoding.
+    """Returns the pixels of an image, shape (height, width, channels), in the channel order of the encoding.
 
     Raises:
         ValueError: The encoding is unknown, or the size of the data is wrong.
@@ -44,7 +44,7 @@ def pixel_array(message: Any) -> npt.NDArray[Any]:
 
 
 def colours(pixels: npt.NDArray[Any], encoding: str) -> npt.NDArray[Any]:
-    """Returns the channels red, green, blue of pixels with at least three channels.
+    """Returns the RGB channels of pixels with at least three channels.
 
     Args:
         pixels: Array of `pixel_array`.
@@ -54,7 +54,7 @@ def colours(pixels: npt.NDArray[Any], encoding: str) -> npt.NDArray[Any]:
 
 
 def depth_array(message: Any) -> npt.NDArray[np.float32]:
-    """Returns the depths of an image, shape (height, width) [m]; NaN without a measurement.
+    """Returns the depths of an image, shape (height, width) [m]; NaN for pixels without a measurement.
 
     Raises:
         ValueError: The encoding is not 32FC1 [m] or 16UC1 [mm], or the size of the data is wrong.
@@ -68,10 +68,10 @@ def depth_array(message: Any) -> npt.NDArray[np.float32]:
 
 
 def colour_array(message: Any) -> npt.NDArray[np.uint8]:
-    """Returns the colours of an image, shape (height, width, 3), red first.
+    """Returns the RGB colours of an image, shape (height, width, 3).
 
     Raises:
-        ValueError: The encoding is not a colour, or the size of the data is wrong.
+        ValueError: The encoding has no colours, or the size of the data is wrong.
     """
     if not message.encoding.startswith(("rgb", "bgr")):
         raise ValueError(f"encoding is '{message.encoding[:50]}'; allowed for colours: rgb8, bgr8, rgba8, bgra8")

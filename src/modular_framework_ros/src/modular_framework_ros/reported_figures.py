@@ -48,7 +48,7 @@ class Figure:
 
 
 class MethodFault(IntEnum):
-    """Fault of an external method, the value of the figure `METHOD_FAULT`."""
+    """Fault of an external method; value of the figure `METHOD_FAULT`."""
 
     NOT_STARTED = 1
     DIED = 2

@@ -25,7 +25,7 @@ class KinematicTree:
         self._joints = links_of.keys()
 
     def up(self, link: str) -> Iterator[tuple[str, str]]:
-        """Yields the joints from a link up to the root, each with its parent link; a cycle of joints only once."""
+        """Yields the joints from a link up to the root, each with its parent link; stops before a repeated link."""
         below = {link}
         while link in self._above and self._above[link][1] not in below:  # a virtual joint may connect equal names
             joint, link = self._above[link]

@@ -82,7 +82,7 @@ def read_urdf(text: str | bytes, location: str = "robot_description") -> Robot:
 
 
 def _refuse_loops(joints: Sequence[Joint], location: str) -> None:
-    """Raises an error if a link is above itself; joints without links, as in a list of joints, have no place."""
+    """Raises an error if a link is its own ancestor; ignores joints without links."""
     parents = TopologicalSorter[str]()
     for joint in joints:
         if joint.parent and joint.child:

@@ -171,7 +171,7 @@ def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loo
     line.remove_object()
     assert go(loop, 1.5).status is GoalStatus.SUCCEEDED
     handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
-    # the goal succeeds as fast fingers pass it, and they may overshoot where an object was removed
+    # the goal succeeds when the fingers pass the goal; without the object, fast fingers may overshoot
     loop.run(lambda: abs(handle.position - 1.5) < 0.03 and abs(handle.velocity) < 0.02)
     if "swing" not in loop.controllers:
         loop.manager.load_controller("swing")

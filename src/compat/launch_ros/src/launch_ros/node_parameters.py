@@ -23,7 +23,7 @@ DESCRIPTION = "robot_description"
 DESCRIPTION_PARTS = ("", "_semantic", "_kinematics", "_planning")
 """Suffixes of the parameters that RViz, robot_state_publisher and MoveIt's clients read in their namespace."""
 WILDCARDS = {"*": r"/[^/]+", "**": r"(/[^/]+)*"}
-"""Expressions of the wildcards in patterns of node names: one part of a name, and any number of parts, also none."""
+"""Regular expressions of the wildcards in node names: a single namespace, or any number including none."""
 CLOCK = "use_sim_time"
 """Parameter of the clock in the root namespace, which is shared by all nodes of a ROS 1 master."""
 

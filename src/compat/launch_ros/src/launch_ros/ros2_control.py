@@ -144,7 +144,7 @@ def controller_parameters(
 
     Args:
         sources: Parameter files of the controllers.
-        given_types: Types of controllers with a section, by name; they replace types in the files.
+        given_types: Types that replace types in the files, keyed by name of a controller with a section.
     """
     types: dict[str, str] = {}
     found: dict[str, dict[str, Any]] = {}

@@ -45,7 +45,7 @@ def nearest_values(
     rotation: Rotation,
     position: Any,
 ) -> dict[str, float]:
-    """Returns joint positions within bounds with the smallest pose error that least squares find from a start.
+    """Minimises the pose error of a link by least squares, within the joint bounds.
 
     Args:
         chain: Joints from the base to the link, including fixed joints.

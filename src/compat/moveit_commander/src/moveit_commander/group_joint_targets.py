@@ -194,7 +194,7 @@ class GroupJointTargets(GroupSettings):
         self._set_values({name: value for name, value in found.items() if name in wanted})
 
     def _seed(self) -> dict[str, float]:
-        """Returns the joint target without passive joints, which stay where they are."""
+        """Returns the joint target without passive joints, which do not move."""
         return {name: value for name, value in self._joint_target.items() if name not in self._model.passive}
 
     def _nearest_values(self, link: str, pose: PoseStamped) -> dict[str, float]:

@@ -143,7 +143,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
 
 
 def _with_known_names(end: EpisodeEnd, stage: SimulatedStage | None) -> EpisodeEnd:
-    """Returns the end, which is invalid if a predicate names a model or joint that the world never had."""
+    """Returns the end of an episode; invalid if a predicate names a model or joint that never existed in the world."""
     settings = end.spec.settings
     is_measured = end.status not in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID)
     if not is_measured or stage is None or not isinstance(settings, TaskSettings):

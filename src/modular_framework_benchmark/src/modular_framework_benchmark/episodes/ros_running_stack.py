@@ -95,7 +95,7 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
 
 
 def _command_digests(parameters: Mapping[str, Any], generators: Iterable[str]) -> dict[str, str]:
-    """Returns the SHA-256 of the files in the commands of external methods, keyed by description."""
+    """Returns the SHA-256 of each file in the commands of external methods, keyed by a description of the file."""
     commands = [_value(parameters, f"{node}/command") for node in generators]
     words = [Path(str(word)) for command in commands if isinstance(command, list) for word in command]
     paths = [word for word in words if word.is_absolute() and word.is_file()]

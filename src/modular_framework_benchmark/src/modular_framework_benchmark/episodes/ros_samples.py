@@ -30,7 +30,7 @@ MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object",
 REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
 COMPONENT_REPORTS = "component_reports"
 RECORDED_COMPONENTS = frozenset({"planning", *ACTIONS.values()})
-"""Components that are recorded from messages of the framework's nodes; no other node may report them."""
+"""Components recorded from messages of the framework's nodes; other nodes must not report these components."""
 SUCCEEDED = 3
 """Status of actionlib_msgs/GoalStatus."""
 
@@ -50,7 +50,7 @@ class Samples:
         paths: Motions that move_group displays.
         components: (real time [s], report of a component).
         ends: Statuses of the task node on the ends of tasks.
-        forgeries: (topic, sender) of messages from a node that may not send them; they are dropped.
+        forgeries: (topic, sender) of dropped messages, whose sender must not publish on the topic.
     """
 
     def __init__(self) -> None:
@@ -138,7 +138,7 @@ class Samples:
             self._subscribers[topic] = rospy.Subscriber(topic, kind, receive, tcp_nodelay=True)
 
     def interference(self) -> str:
-        """Returns the nodes that publish in place of the simulation, the task or another component; "" for none."""
+        """Returns the nodes that publish in place of the simulation, the task or another component, or ""."""
         return "; ".join(
             f"a node named '{sender}' publishes {topic}"
             for topic, sender in sorted(self.forgeries)
@@ -166,7 +166,7 @@ class Samples:
         self._subscribe(f"{name}/result", result, lambda message: self._on_result(f"{name}/result", message))
 
     def _on_result(self, topic: str, message: Any) -> None:
-        """Adds a result of an action's server: move_group, or the first node that sends a result; notes other nodes."""
+        """Adds a result of the action server, which is move_group or the first sender; records other senders."""
         sender = message._connection_header["callerid"]
         server = self._servers.setdefault(topic, sender)
         if sender == server:
@@ -175,7 +175,7 @@ class Samples:
             self.forgeries.add((topic, sender))
 
     def _on_component_report(self, message: String) -> None:
-        """Adds the report of a component, unless it stands for a component that another node reports."""
+        """Adds the report of a component, unless the component is recorded from another node."""
         wall_s, report = _timed_report(message)
         if report["component"] in RECORDED_COMPONENTS:
             self.forgeries.add(

@@ -123,7 +123,7 @@ class TaskEpisodeRunner:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
             if not answer.get("foul"):
                 cause = f"no end within {settings.time_limit:g} s; {stack.last_output()}"
-                # The method is not called before the world is ready.
+                # Without a request, the world was not ready and the method was not called.
                 status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
                 return end.with_status(status, cause, answer)
         if "fault" in answer:

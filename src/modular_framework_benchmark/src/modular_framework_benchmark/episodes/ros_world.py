@@ -32,7 +32,7 @@ SPAWN_SERVICE, REFEREE_SERVICE, RECORD_SERVICE, PERCEPTION_SERVICE = (
 )
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
 ABORTED_TIMEOUT_S = 5.0
-"""Maximum duration of a call after an episode was aborted, because its simulation may hang [s]."""
+"""Maximum duration of a call after an aborted episode, because the simulation may hang [s]."""
 SERVICE_TIMEOUT_S = 60.0  # long enough for a convex decomposition of a mesh
 
 REST_M_S, REST_RAD_S = 0.02, 0.2
@@ -149,7 +149,7 @@ def judge(timeout_s: float = SERVICE_TIMEOUT_S) -> Judgement:
 
 
 def aborted_interference(since: int) -> str:
-    """Returns the interference since an intervention in an episode that was aborted; "" if the simulation hangs.
+    """Returns the interference in an aborted episode since an intervention; "" if the simulation hangs.
 
     Args:
         since: Number of the intervention.

@@ -52,7 +52,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A uniform choice among given numbers; a single number is a constant."""
+    """A uniform choice among given numbers; with a single number, a constant."""
 
     values: tuple[float, ...]
 

@@ -100,7 +100,7 @@ def _known_with_limit(
 
 
 def _limit_fault(metric: Metric) -> str:
-    """Returns the fault of the limit of a metric, otherwise ""."""
+    """Returns the fault in the limit of a metric, or ""."""
     if metric.limit is None:
         return ""
     if metric.is_fraction:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sizes and joints of models: the sides of their boxes, the height at which they stand on a surface, their joints."""
+"""Sizes and joints of models: side lengths of bounding boxes, height of a model on a surface, movable joints."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
 
 
 def movable_joints(model: specs.Model) -> tuple[str, ...]:
-    """Returns the names of the joints whose position the simulation records; a static model has none."""
+    """Returns the names of the joints whose position the simulation records; empty for a static model."""
     recorded = (specs.JointType.REVOLUTE, specs.JointType.CONTINUOUS, specs.JointType.PRISMATIC)
     return tuple(joint.name for joint in model.joints if joint.kind in recorded and not model.static)
 

@@ -47,8 +47,8 @@ class KnownNames:
 
     Attributes:
         objects: Names of the objects of the experiment, in order.
-        models: Names of the models of the world; None if unknown, so that no name is checked.
-        joints: Names of the movable joints of models and objects, keyed by model; without entry if unknown.
+        models: Names of the models of the world; None if unknown, and then no name is checked.
+        joints: Names of the movable joints of models and objects, keyed by model; unknown models have no entry.
         regions: Regions by name.
     """
 

@@ -15,7 +15,7 @@ class UnresolvedReference(Exception):
 
 
 class UnreadableWorld(UnresolvedReference):
-    """The world of a launch is missing or invalid, so that no episode could start; the message names file and line."""
+    """The world of a launch is missing or invalid, and no episode can start; the message names file and line."""
 
 
 class ResourceLookup(Protocol):
@@ -70,7 +70,7 @@ class ResourceLookup(Protocol):
         """
 
     def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
-        """Returns the models in the world of a launch: the names of their movable joints, keyed by model.
+        """Returns the movable joints of each model in the world of a launch, keyed by model.
 
         Args:
             launch: Launch file with the arguments `description_package` and `world_file`.

@@ -58,8 +58,7 @@ class LaunchCheck:
         given: Overriding parameters, keyed by full name.
         extra: Names of overriding parameters that the user's own nodes read.
         regions: Names of regions that episodes add to the regions of the launch.
-        models: Names of the models of the world and of the objects; None if they are unknown, so that no model is
-            checked.
+        models: Names of the models of the world and of the objects; None if unknown, and then no model is checked.
     """
 
     def __init__(
@@ -167,7 +166,7 @@ class LaunchCheck:
         yield from self._names.below_trees(self._given, robot.by_kind())
 
     def _model_faults(self) -> Iterator[LaunchFault]:
-        """Yields models and objects that the world lacks."""
+        """Yields the named models and objects that are missing in the world."""
         if self._models is None:
             return
         for name, value in self._names.naming("model"):

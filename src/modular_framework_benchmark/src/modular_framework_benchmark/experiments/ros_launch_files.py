@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds missing programs, and entries and values that the nodes of a launch would refuse or leave out at run time."""
+"""Finds missing programs, and entries and values that the nodes of a launch would refuse or ignore at run time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ REGIONS = "/regions"
 
 
 def program_faults(nodes: Iterable[LaunchedNode]) -> Iterator[LaunchFault]:
-    """Yields a fault for each node whose package or program does not exist: roslaunch goes on without the node."""
+    """Yields a fault for each node whose package or program does not exist; roslaunch would start the other nodes."""
     packages = rospkg.RosPack()
     for node in nodes:
         start = f"node '{node.name}':"
@@ -51,7 +51,7 @@ def program_faults(nodes: Iterable[LaunchedNode]) -> Iterator[LaunchFault]:
 
 
 def sensor_faults(launch: LaunchPreview) -> Iterator[LaunchFault]:
-    """Yields the invalid sensors of the octomap and of the sensor frames; the nodes would leave these out."""
+    """Yields the invalid sensors of the octomap and of the sensor frames, which the nodes would ignore."""
     for node in launch.nodes:
         if node.executable == MOVE_GROUP:
             name = f"{node.name}/sensors"
@@ -94,7 +94,7 @@ def argument_faults(launch: LaunchPreview, robot: RobotNames) -> Iterator[Launch
 def named_entry_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:
     """Yields a sentence for each invalid named joint state, pose and trajectory, and for each unknown joint of a state.
 
-    A state without any joint similar to the robot's joints belongs to a different robot: its joints are not compared.
+    A state without any joint similar to the robot's joints is for a different robot, and its joints are not checked.
 
     Args:
         folder: Configuration folder; a missing file has no entries.

@@ -105,7 +105,7 @@ class RosResourceLookup:
         raise UnresolvedReference(f"there is no model '{name}'; {listing(model_names)}{nearest(name, model_names)}")
 
     def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
-        """Returns the models in the world of a launch with the names of their movable joints."""
+        """Returns the movable joints of each model in the world of a launch, keyed by model."""
         description = self._description(launch, arguments)
         file = self._launch_values(launch, arguments).get("world_file", "")
         return _models_of(description / "worlds" / file, description / "models") if file else {}

@@ -317,7 +317,7 @@ def placed_objects(
         launch: Launch file whose description package contains the models.
         arguments: Arguments of the launch file.
         reading: Reader that collects faults.
-        world: Names of the models of the world, which no object may have.
+        world: Names of the models of the world; objects must have different names.
     """
     taken_names: set[str] = set()
     objects: list[SceneObject] = []

@@ -41,7 +41,7 @@ OWN_ARGUMENTS = {
 }
 """Launch arguments that the episodes set themselves, with the alternative for the user."""
 WORLD_ARGUMENTS = ("world_file", "description_package")
-"""Arguments that name the world; the first names its file."""
+"""Arguments that name the world; the first argument names the world file."""
 FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
 """Arguments that name a file but determine neither the launched nodes nor the robot."""
 
@@ -230,7 +230,7 @@ def _finish(
 def _world_models(
     read: ReadSettings[TaskSettings], arguments: Map[str, str], reading: Reading
 ) -> Map[str, Sequence[str]] | None:
-    """Returns the models of the world with their joints; None if the world is unknown.
+    """Returns the joints of each model in the world, keyed by model; None if the world is unknown.
 
     Adds a fault if the world cannot be read.
     """

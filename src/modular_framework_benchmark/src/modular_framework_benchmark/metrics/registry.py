@@ -19,7 +19,7 @@ from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock, Source
 
 ROUNDING = 1e-9
-"""Relative and absolute rounding error with which a value may exceed a bound."""
+"""Relative and absolute tolerance for rounding errors at a bound."""
 
 MetricFunction = Callable[[EpisodeMeasurements], float | None]
 """Function that returns the value of a metric for an episode, or None without a value."""

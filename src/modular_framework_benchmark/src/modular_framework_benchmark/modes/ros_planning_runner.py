@@ -52,7 +52,7 @@ BROKEN_CODES = (
     ErrorCode.FRAME_TRANSFORM_FAILURE,
     ErrorCode.UNRECOGNIZED_GOAL_TYPE,
 )
-"""Errors of the problem or its names, which no planner can avoid."""
+"""Errors in the problem or in its names; every planner fails with these errors."""
 
 FULL_SPEED = {"default_velocity_scaling_factor": 1.0, "default_acceleration_scaling_factor": 1.0}
 PLUGINS = {  # defaults for pipelines without a configuration

@@ -177,7 +177,7 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
 
 
 def _models(read: ReadSettings[TaskSettings]) -> tuple[str, ...] | None:
-    """Returns the names of the models of the world and of the objects; None if they are unknown."""
+    """Returns the names of the models of the world and of the objects; None if the names are unknown."""
     if read.unreadable & {"arguments", "objects"}:
         return None
     try:
@@ -215,7 +215,7 @@ def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSet
 
 
 def _problem_faults(read: ReadSettings[PlanningSettings], robot: Robot) -> Iterator[SettingFault]:
-    """Yields the errors in the files of the problems; the problems after the first few are counted."""
+    """Yields the errors in the files of the first problems with errors, and the number of further problems."""
     texts = [text for problem in read.problems if (text := _problem_fault(problem, robot.model, read.settings.group))]
     for text in texts[:MAX_PROBLEM_FAULTS]:
         yield SettingFault(("problems",), text)
@@ -226,7 +226,7 @@ def _problem_faults(read: ReadSettings[PlanningSettings], robot: Robot) -> Itera
 
 @lru_cache(maxsize=4096)
 def _problem_fault(problem: Problem, model: RobotModel, group: str) -> str:
-    """Returns the error in the files of a problem; "" for none. Cached, because levels share their problems."""
+    """Returns the error in the files of a problem, or "". Cached, because levels share problems."""
     try:
         load_problem(problem, model, group)
     except ModeError as error:

@@ -353,7 +353,7 @@ class JointAtLeast(Condition):
         return f"joint '{self.joint}' of '{self.model}' is at {self.position:g} or beyond"
 
     def unknown_name_text(self, world: WorldTrack) -> str:
-        """Returns that the model or its joint does not exist; "" if both do."""
+        """Returns a text if the model or its joint never existed in the world, otherwise ""."""
         text, joints = Condition.unknown_name_text(self, world), []
         if not text:
             joints = list(world.bodies[self.model].joints)

@@ -81,7 +81,7 @@ class Condition(Predicate):
         return model_names(self)
 
     def unknown_name_text(self, world: WorldTrack) -> str:
-        """Returns which named model, or part of a model, a world has never had; "" if the world knows all names."""
+        """Returns a text that names a model or joint that never existed in the world; "" if all names exist."""
         missing = [name for name in self.names if name not in world.bodies]
         return f"there is no '{missing[0]}' in the world" if missing else ""
 

@@ -85,7 +85,7 @@ def keys_of(kind: type[Any]) -> dict[str, tuple[PredicateKey, Field[Any]]]:
 
 
 def model_names(condition: Any) -> tuple[str, ...]:
-    """Returns the values of the keys that name models, without words such as `robot` that stand for no single model."""
+    """Returns the model names in a condition, without keywords such as `robot` that do not name a model."""
     found: list[str] = []
     for key, (declared, _) in keys_of(type(condition)).items():
         if declared.kind in (KeyKind.OBJECT, KeyKind.OBJECTS, KeyKind.MODEL):

@@ -38,9 +38,9 @@ class SimulatedStage:
         return condition.unknown_name_text(self.world) or condition.measurement_text(self.world)
 
     def unknown_name_text(self, conditions: Iterable[Condition]) -> str:
-        """Returns a model or joint of some conditions that the world has never had; "" if all have existed.
+        """Returns a text that names a model or joint that never existed in the world; "" if all names exist.
 
-        Such a condition does not say anything about a method, neither by itself nor negated.
+        A condition with an unknown name, or its negation, gives no information about a method.
 
         Args:
             conditions: Conditions of the success criteria and milestones.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names that metrics and factors must not have, because every result table has columns with these names."""
+"""Reserved names that metrics and factors must not use: the column names of every result table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RESULT_COLUMNS = frozenset(
         "failure_class"
     ).split()
 )
-"""Columns of the result table that every experiment has; factors and metrics must not use these names."""
+"""Columns of the result table of every experiment; factors and metrics must not use these names."""
 ARENA_COLUMNS = frozenset({"id", "experimentid", "plannerid", "experiment", "planner", "version"})
 """Columns that Planner Arena joins to every run; metrics must not use these names."""
 

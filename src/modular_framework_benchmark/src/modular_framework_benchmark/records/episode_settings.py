@@ -185,7 +185,7 @@ def as_json(value: Any) -> Any:
 
 
 def from_json(kind: Callable[..., _T], content: Mapping[str, Any]) -> _T:
-    """Returns the dataclass whose JSON values `as_json` or `dataclasses.asdict` gave; ignores keys of another version.
+    """Returns a dataclass from JSON values of `as_json` or `dataclasses.asdict`; ignores unknown keys.
 
     Args:
         kind: Class of the result.

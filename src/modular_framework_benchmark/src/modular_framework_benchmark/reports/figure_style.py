@@ -131,7 +131,7 @@ def whiskers(estimates: Sequence[Estimate], scale: float, color: str, **line: fl
     """Returns the error bars of estimates with intervals; infinite ends are not drawn.
 
     Args:
-        estimates: Estimates, some of them perhaps without an interval.
+        estimates: Estimates; estimates without an interval have bars of zero length.
         scale: Units of the axis per unit of the estimates.
         color: Colour.
         **line: Further settings of the bars, such as their width [px].

@@ -21,7 +21,7 @@ from modular_framework_benchmark.statistics.comparison import Comparison, Verdic
 from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of, unmeasured_reason
 
 SIDE_FACTOR = "(side)"
-"""Name of the factor of both experiments; no name of an experiment's factor has parentheses."""
+"""Name of the factor that distinguishes the experiments; the names of all other factors have no parentheses."""
 AFTER, BEFORE = "after", "before"
 
 
@@ -95,7 +95,7 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
     """Returns the changes between two experiments.
 
     Raises:
-        ReportError: The experiments differ in their factors, share no method or no metric, or one measured no method.
+        ReportError: The experiments have different factors, share no method or no metric, or measured no method.
     """
     _check_factors(before.description, after.description)
     for side, results in (("earlier", before), ("later", after)):

@@ -222,7 +222,7 @@ def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[
 
 
 def main_metric(description: ExperimentDescription) -> Metric | None:
-    """Returns the first metric of an experiment besides success."""
+    """Returns the first metric of an experiment other than success."""
     return next((item for item in description.metrics if item.name != SUCCESS), None)
 
 

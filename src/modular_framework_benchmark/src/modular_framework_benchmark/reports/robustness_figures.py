@@ -33,7 +33,7 @@ from modular_framework_benchmark.statistics.sentences import enumeration
 
 FIGURE_PREFIX = "robustness_"
 MAX_BROKEN_LEVELS = 4
-"""Number of levels with broken or invalid episodes that a sentence names."""
+"""Maximum number of levels with broken or invalid episodes that a sentence names."""
 CURVE_OFFSET = 0.008
 """Distance between the points of two methods at one level, as a fraction of the tested range."""
 

@@ -119,7 +119,7 @@ def _number(value: float | None) -> float | None:
 
 
 def _span_row(run: int, index: int, span: Span) -> dict[str, Any]:
-    """Returns the row of a span in `spans`; numbers may be NumPy's."""
+    """Returns the row of a span in `spans`; converts NumPy numbers to Python numbers."""
     times = {"started_s": float(span.started_s), "ended_s": _number(span.ended_s)}
     return {"runid": run, "place": index, **asdict(span), **times, "failed": bool(span.failed)}
 

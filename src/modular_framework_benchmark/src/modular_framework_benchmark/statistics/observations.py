@@ -3,12 +3,12 @@
 
 This module defines the value of an episode that failed, timed out, broke or lacks a value:
 
-- Success: every episode that does not succeed is a failure, including broken and invalid ones.
+- Success: every episode that does not succeed is a failure, including broken and invalid episodes.
 - Other metrics except rates and partial credit: an unsuccessful episode ranks worse than any value if the metric
   describes the whole task (outside the mode `task`, for every metric) or if the episode has no value. Its value in a
   mean is the metric's limit, if there is one. Values beyond the limit also count at the limit.
-- Partial credit: every episode has its own value; an episode without one, such as a broken or invalid episode, counts
-  as 0.
+- Partial credit: every episode has its own value; an episode without a value, such as a broken or invalid episode,
+  counts as 0.
 - Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
   Missing values are excluded from the figures and counted.
 

@@ -4,8 +4,8 @@
 A curve is an isotonic regression: success does not rise with the distance from the nominal value. No level outside the
 tested levels is predicted.
 
-Claims follow the rules of the comparisons: no claim before the last episode, after an interim analysis, or about levels
-that measured no method.
+Claims follow the rules of the comparisons. The report makes no claim before the last episode, after an interim
+analysis, or about levels at which no method was measured.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class CurvePoint:
         value: Value of the axis, or the mean of the group, in the unit of the axis.
         low: Smallest value of the group.
         high: Largest value of the group.
-        success: Success of the method; without an estimate if the level measured no method.
+        success: Success of the method; without an estimate if no method was measured at the level.
         progress: Progress of the method; None without milestones.
         claimed: Interval of the success that holds jointly for all methods and sides of axes; None if nothing may be
             claimed.
@@ -148,8 +148,9 @@ class Robustness:
         curves: Curve of each method along each axis.
         order: Names of the axes, the largest mean fall in success first.
         confidence: Confidence level of the interval of a single level.
-        joint_confidence: Confidence level of each claimed interval; jointly they hold at the level `confidence`.
-        no_claims: Reason why nothing is claimed; "" if claims are possible.
+        joint_confidence: Confidence level of each claimed interval; all claimed intervals jointly have the level
+            `confidence`.
+        no_claims: Reason why the report makes no claims; "" if claims are possible.
     """
 
     perturbations: Perturbations
@@ -266,7 +267,7 @@ class _Analysis:
 
 
 def _reason_for_no_claims(results: ExperimentResults) -> str:
-    """Returns the reason why nothing may be claimed about the robustness, otherwise ""."""
+    """Returns the reason why the report makes no claims about the robustness, otherwise ""."""
     description = results.description
     if description.sequential:
         return "a stopping rule looked at the results"
@@ -278,7 +279,7 @@ def _reason_for_no_claims(results: ExperimentResults) -> str:
 
 
 def _side_count(axis: PerturbedAxis, perturbations: Perturbations) -> int:
-    """Returns the number of sides of the nominal value of an axis with tested levels."""
+    """Returns the number of sides of the nominal value that have tested levels."""
     values = [float(np.mean(group.values)) for group in _groups(axis, perturbations)]
     return any(value > axis.nominal for value in values) + any(value < axis.nominal for value in values)
 

@@ -30,7 +30,7 @@ def summarise_method(
         table: Finished episodes.
         metric: Metric to summarise.
         method: Level of the compared factor.
-        confidence: Confidence level of the intervals; None for that of the experiment.
+        confidence: Confidence level of the intervals; None for the confidence level of the experiment.
     """
     observed = table.observations(metric, method)
     counts = table.counts(metric, method)

@@ -71,7 +71,7 @@ class NoCandidatesError(RuntimeError):
 
 
 class MethodFaultError(NoCandidatesError):
-    """The method itself failed, which ends the generation for all objects; the message is the cause."""
+    """The method failed; the generation ends for all objects. The message states the cause."""
 
 
 class ReadNumber(Protocol):
@@ -129,7 +129,7 @@ class MeasuredMethod(Protocol):
 
 @runtime_checkable
 class SeeingMethod(ConnectedMethod, Protocol):
-    """Additional interface of a grasp method that detects objects itself if the planning scene has none."""
+    """Additional interface of a grasp method that detects objects if the planning scene contains no objects."""
 
     def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
         """Returns the detected objects.

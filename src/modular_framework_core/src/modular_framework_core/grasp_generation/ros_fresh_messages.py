@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Receives the messages of a camera on demand, which show the world at the time of the call."""
+"""Receives camera messages on demand; the messages are not older than the call."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ BUFFER_BYTES = 1 << 25
 
 
 class NoMessageError(RuntimeError):
-    """A topic had no message in time.
+    """No message of a topic arrived in time.
 
     Attributes:
         topic: Full name of the topic.
-        publishers: Number of its publishers.
+        publishers: Number of publishers of the topic.
     """
 
     def __init__(self, topic: str, publishers: int) -> None:
@@ -42,16 +42,16 @@ class FreshMessages:
         self._time = SimulatedTime()
 
     def take(self, kinds: Mapping[str, type], timeout_s: float) -> dict[str, Any]:
-        """Waits for a message of each topic; all have the same stamp, which is not older than this call.
+        """Waits for a message of each topic; all messages have the same stamp, which is not older than this call.
 
-        If time is held, only messages with that exact stamp count; a later stamp comes from before a world reset.
+        If time is held, only messages with exactly that stamp count; a later stamp is from before a world reset.
 
         Args:
             kinds: Message type of each topic, with a header.
             timeout_s: Maximum wait [s of the ROS clock; s of real time for a topic without a publisher].
 
         Raises:
-            NoMessageError: A topic had no message in time.
+            NoMessageError: No message of a topic arrived in time.
         """
         held = self._time.now()
         start_time = held or rospy.Time.now()

@@ -79,8 +79,8 @@ class GraspGenerator:
     New grasps replace the previous grasps. An object that the robot sets down counts as the object of the same name
     that was attached before.
 
-    - Parameters: see ``ros_generator_settings`` and the parameters of the method. They are read for every generation,
-      and every 2 s while the scene is watched.
+    - Parameters: see ``ros_generator_settings`` and the parameters of the method. The parameters are read for every
+      generation, and every 2 s while the scene is watched.
     - Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
       ``component_reports`` (std_msgs/String, JSON: duration and number of grasps of a generation).
     - Services ``generate_grasps`` and ``~generate`` (std_srvs/Trigger): generate grasps.

@@ -31,7 +31,7 @@ class Transforms:
     """
 
     def __init__(self) -> None:
-        """Creates the buffer without any subscription, see :meth:`connect`."""
+        """Creates the buffer without subscriptions; :meth:`connect` subscribes to TF."""
         self._buffer: Any = None
         self._latest = rospy.Time()
 

@@ -154,7 +154,7 @@ class DeclaredNames:
                 yield LaunchFault(name, f"no node reads the parameter '{name}'; did you mean '{meant}'?")
 
     def _meant_node(self, name: str) -> str:
-        """Returns a parameter's name with its first part replaced by the node that it misspells, or ""."""
+        """Returns a parameter's name with the misspelt node name corrected, or ""."""
         first, _, rest = name.removeprefix("/").partition("/")
         nodes = {node.name.split("/")[1] for node in self._launch.nodes}
         meant = next((node for node in sorted(nodes) if rest and first not in nodes and misspelling(first, node)), "")

@@ -126,7 +126,7 @@ class KnownNames:
 
 
 def model_of(name: str) -> str:
-    """Returns the model of an object of the planning scene, which is named MODEL or MODEL__LINK."""
+    """Returns the model name of a planning scene object with the name MODEL or MODEL__LINK."""
     return name.partition("__")[0]
 
 

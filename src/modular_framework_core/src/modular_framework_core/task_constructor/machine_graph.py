@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws a state machine with Graphviz, whether it comes from a task or from a running smach machine."""
+"""Draws the state machine of a task or of a running smach container with Graphviz."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class MachineFrame:
     tooltip: str = ""
 
     def child(self, label: str) -> StateBox | MachineFrame | None:
-        """Returns a state by its label, or None."""
+        """Returns the state or nested machine with a label, or None."""
         return next((child for child in self.children if child.label == label), None)
 
 
@@ -77,8 +77,8 @@ def draw(machine: MachineFrame) -> graphviz.Digraph:
     """Returns the graph of a machine, with nested machines as nested frames.
 
     State machines have a solid frame, concurrences a dashed frame. Outcomes are ovals; the first outcome is green, the
-    last red. States and frames have their path as id in SVG, such as "task/Machine/State", and the arrow of a
-    transition has the path of the state, a space and the outcome.
+    last outcome is red. In SVG, the id of a state or frame is its path, such as "task/Machine/State". The id of an
+    arrow is the path of the state, a space and the outcome.
     """
     graph = graphviz.Digraph(
         machine.label,
@@ -158,7 +158,7 @@ def _draw_child(frame: graphviz.Digraph, child: StateBox | MachineFrame, path: s
 
 
 def _draw_transition(frame: graphviz.Digraph, machine: MachineFrame, path: str, transition: Transition) -> None:
-    """Draws a transition. The arrow of a nested machine starts at the oval of the outcome, which is its label."""
+    """Draws a transition. The arrow of a nested machine has no label and starts at the oval of the outcome."""
     start = f"{path}/{transition.start}"
     is_nested = isinstance(machine.child(transition.start), MachineFrame)
     tail = _outcome(start, transition.outcome) if is_nested else start
@@ -192,7 +192,7 @@ def _head(machine: MachineFrame, path: str, target: str) -> tuple[str, dict[str,
 
 
 def _node(path: str) -> str:
-    """Returns the name of a path's node in the graph, without colons, which would separate a port."""
+    """Returns the node name of a path without colons, because Graphviz reads a colon as the start of a port."""
     return path.replace(":", "\N{RATIO}")
 
 

@@ -16,7 +16,7 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 
 PROBE_ANGLE = 0.37  # generic angle at which no two axes align by chance [rad]
 MAX_CACHED_SOLVERS = 4096  # one solver per value of the locked joint
-ALIGNED_WRIST = 0.01  # volume spanned by the last three axes below which the wrist counts as singular
+ALIGNED_WRIST = 0.01  # the wrist is singular if the last three axes span a smaller volume
 
 
 class ClosedForm:

@@ -82,7 +82,7 @@ class InverseKinematics:
     def is_complete(self, tip_link: str, target: Transform, seed: Array) -> bool:
         """Returns whether `solutions` finds all solutions of a target.
 
-        A closed form of six joints does, unless the wrist is singular: then there are infinitely many solutions.
+        A closed form of six joints finds all solutions, unless the wrist is singular and has infinitely many solutions.
 
         Args:
             tip_link: Link to bring to the target, see tip_offset.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Faults in the YAML files of a motion planning problem: names that the robot does not have, and keys without effect.
 
-A problem that is read with a name or key left out would be an easier problem, or a different one.
+A reader that ignored a name or a key would read an easier or different problem.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class _ProblemCheck:
     """Collects the faults of a file.
 
     Attributes:
-        faults: Faults that were found.
+        faults: Faults found so far.
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -115,7 +115,7 @@ class _ProblemCheck:
     def mapping(
         self, entry: Any, field_name: str, allowed: Sequence[str], unsupported: Sequence[str] = ()
     ) -> Mapping[str, Any]:
-        """Returns a mapping, empty after a fault, and checks its keys.
+        """Checks the keys of a mapping, and returns the mapping; empty after a fault.
 
         Args:
             entry: Value of the field.
@@ -226,7 +226,7 @@ class _ProblemCheck:
 
 
 def _is_empty(value: Any) -> bool:
-    """Returns whether a value, with all values inside, is the default of a message."""
+    """Returns whether a value, including nested values, is the default of a message."""
     match value:
         case Mapping():
             return all(_is_empty(each) for each in value.values())

@@ -64,7 +64,7 @@ def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, source_nam
 
 
 def _with_state(scene: PlanningScene, state: Mapping[str, Any] | None, source_name: str) -> PlanningScene:
-    """Returns the scene with the robot in a state; joints without a position keep theirs."""
+    """Returns the scene with the robot in a state; joints without a position in the state do not move."""
     joints = (state or {}).get("joint_state") or {}
     pairs = zip(joints.get("name") or (), joints.get("position") or (), strict=True)
     values = {name: float(value) for name, value in pairs if name in scene.model.index}
@@ -79,7 +79,7 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
         path: Path of the file.
 
     Raises:
-        ModelError: The file has a key that would be left out, or names a joint that the robot does not have.
+        ModelError: The file has an unsupported key, or names a joint that the robot does not have.
         PlanningError: A shape, a pose or a frame is invalid.
     """
     content = _load(path)
@@ -102,7 +102,7 @@ def read_problem(
 ) -> MotionProblem:
     """Returns a problem.
 
-    Joints without a position in the start state keep their position of the scene, or else 0. The start state may name
+    Joints without a position in the start state have their position in the scene, or 0. The start state may name
     joints that the robot does not have, such as joints of a gripper, if it has positions of all joints of the group.
 
     Args:
@@ -113,7 +113,7 @@ def read_problem(
         group: Planning group that replaces the group of the request; "" for none.
 
     Raises:
-        ModelError: A file names what the robot does not have, or has a key that would be left out.
+        ModelError: A file has an unsupported key, or names a group or joint that the robot does not have.
         PlanningError: A shape, a pose or a frame is invalid.
     """
     request = _load(request_path)
@@ -135,7 +135,7 @@ def read_problem(
 
 
 def _joint_goal(constraints: Sequence[Mapping[str, Any]]) -> JointGoal:
-    """Returns the goal of some joint constraints with their tolerances."""
+    """Returns the goal for joint constraints, with their tolerances."""
 
     def values(key: str) -> dict[str, float]:
         return {item["joint_name"]: float(item[key]) for item in constraints if key in item}

@@ -75,7 +75,7 @@ class TimeServices:
             self._serve(ros_names.STATE_DIGEST, Trigger, self._on_digest)
 
     def _serve(self, name: str, kind: Any, respond: Callable[[Any], Any]) -> None:
-        """Advertises a service with `success` and `message`; a failure is logged, and its reason is the message."""
+        """Advertises a service with `success` and `message`; logs failures and returns their reason in `message`."""
 
         def handle(request: Any) -> Any:
             try:

@@ -111,7 +111,7 @@ def _json_text(value: Any) -> str:
 
 
 def _json_value(value: Any) -> Any:
-    """Returns a path as text, a pose as x, y, z, and a quaternion xyzw, and another dataclass as a mapping."""
+    """Converts a path to text, a pose to x, y, z and a quaternion xyzw, and any other dataclass to a mapping."""
     match value:
         case Path():
             return str(value)

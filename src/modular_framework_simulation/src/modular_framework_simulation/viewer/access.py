@@ -74,7 +74,7 @@ class Access:
             raise SimulationError("this viser version has an unchecked server; install the version in requirements.txt")
 
     def checked(self, handler: Callable[..., Any]) -> Callable[..., Any]:
-        """Returns a request handler that refuses requests, and calls another handler for accepted requests.
+        """Returns a request handler that calls another handler for accepted requests, and refuses all other requests.
 
         Args:
             handler: The argument `process_request` of `websockets.asyncio.server.serve`.

@@ -63,7 +63,8 @@ class ViewerNode:
     while shown: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene),
     /move_group/display_planned_path (moveit_msgs/DisplayTrajectory) and an image topic (sensor_msgs/Image).
 
-    Publishes: ~page_address (std_msgs/String, latched), the address with its token, for a page that embeds the viewer.
+    Publishes: ~page_address (std_msgs/String, latched), the viewer's address with its token, for pages that embed the
+        viewer.
 
     Services called: see `GazeboCommands`.
 

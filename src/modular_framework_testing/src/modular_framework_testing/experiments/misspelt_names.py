@@ -307,7 +307,7 @@ def in_task(old: str, new: str, words: str, parameters: dict[str, Any] | None = 
 
 
 def in_placing_task(task: str, old: str, new: str, words: str) -> Case:
-    """Returns the case of a text in a shipped task that places objects, of an experiment with two blocks.
+    """Returns the case of a wrong text in a shipped task that places objects; the experiment has two blocks.
 
     Args:
         task: Name of the shipped task.
@@ -352,7 +352,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
 
 
 def in_drawer(success: dict[str, Any], words: str) -> Case:
-    """Returns the case of success criteria about a drawer with the joint `slide`, an object of an experiment.
+    """Returns the case of wrong success criteria; the experiment has a drawer with the joint `slide`.
 
     Args:
         success: Wrong success criteria.
@@ -369,7 +369,7 @@ def in_drawer(success: dict[str, Any], words: str) -> Case:
 
 
 def in_problem(kind: str, path: tuple[Any, ...], value: Any, words: str) -> Case:
-    """Returns the case of a value in a planning problem.
+    """Returns the case of a wrong value in a planning problem.
 
     Args:
         kind: File of the problem: `scene` or `request`.
@@ -387,7 +387,7 @@ def in_problem(kind: str, path: tuple[Any, ...], value: Any, words: str) -> Case
 
 
 def in_world(old: str, new: str, words: str) -> Case:
-    """Returns the case of a text in the world of an experiment.
+    """Returns the case of a wrong text in the world of an experiment.
 
     Args:
         old: Correct text.
