@@ -32,6 +32,7 @@ PAGE_LINK = re.compile(r"^- \[[^\]]+\]\(([^)#\s]+)\.md\)", re.MULTILINE)
 PACKAGE_KINDS = {
     "Framework": "src/modular_framework_*/README.md",
     "Methods": "src/methods/*/README.md",
+    "Libraries for methods": "src/mbf_*/README.md",
     "Robots": "src/robots/*/README.md",
     "Packages under the names that others use": "src/compat/*/README.md",
 }
