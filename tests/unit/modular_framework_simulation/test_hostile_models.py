@@ -48,6 +48,13 @@ IN_A_MODEL = {
     "frames attached in a circle": (
         f"{LINK}<frame name='f' attached_to='g'/><frame name='g' attached_to='f'/>"
         "<joint name='j' type='fixed'><parent>a</parent><child>f</child></joint>", 2, "depends on itself"),
+    "frames attached in a circle that have poses elsewhere": (
+        f"{LINK}<frame name='f' attached_to='g'><pose relative_to='a'>1 0 0 0 0 0</pose></frame>"
+        "<frame name='g' attached_to='f'><pose relative_to='a'>1 0 0 0 0 0</pose></frame>", 1, "attached to itself"),
+    "a frame attached to nothing": (
+        f"{LINK}<frame name='f' attached_to='h'><pose relative_to='a'>1 0 0 0 0 0</pose></frame>", 1, "'h'; allowed: "),
+    "xacro": ("<link name='a'/>\n<xacro:body/>", 3, "is xacro"),
+    "a name of xacro": ("\n<link name='${prefix}a'/>", 3, "is xacro"),
     "a mass of 0": ("<link name='a'><inertial>\n<mass>0</mass></inertial></link>", 3, "greater than 0"),
     "a box of length 0": (geometry("<box><size>1 0 1</size></box>"), 3, "greater than 0"),
     "a box as large as the sea": (geometry("<box><size>1 1e9 1</size></box>"), 3, "at most 10000 m"),

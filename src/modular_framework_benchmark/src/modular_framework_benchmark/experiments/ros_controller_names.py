@@ -46,7 +46,7 @@ def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterato
             faults = list(_faults_in(read_controller_file(folder / file), joints))
         except ControllerFileError as error:
             file_names = [path.name for path in folder.glob("*.yaml")]
-            faults = [f"{error}{nearest(file, file_names)}"]
+            faults = [f"{error}{'' if file in file_names else nearest(file, file_names)}"]
         for text in faults:
             yield LaunchFault(CONTROLLER_FILE, f"argument '{CONTROLLER_FILE}': {text}", ARGUMENTS)
 

@@ -85,13 +85,17 @@ class FrameTree:
         self._nodes = {child.attributes["name"]: child for child in named if child.tag in _FRAME_TAGS}
 
     def refuse_circles(self) -> None:
-        """Checks that no frames, used or unused, are defined by each other in a circle.
+        """Checks that no frames, used or unused, are defined by or attached to each other in a circle.
 
         Raises:
-            DescriptionError: The frames form a circle, which the text names.
+            DescriptionError: The frames form a circle, which the text names, or a frame is attached to nothing.
         """
-        for name in self._nodes:
+        for name, node in self._nodes.items():
             self.pose_in_model(name)
+            attached_to = node.attributes.get("attached_to", "")
+            if attached_to not in ("", WORLD):
+                self._pose(attached_to, ())  # fails if there is no such frame
+                self._link(name, ())
 
     def _base_of(self, pose: XmlNode) -> str:
         """Returns the base frame of a pose; empty if the attribute `frame` of an old file names an unknown frame."""

@@ -20,7 +20,6 @@ from modular_framework_simulation.models.urdf_extensions import UrdfExtensions
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_numbers, parse_xml
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.rotations import Vector3
-from modular_framework_urdf.xml_text import XACRO_TAGS
 
 _GEOMETRIES = ("box", "cylinder", "sphere", "mesh")
 _SUPPORTED_TAGS = ("link", "joint", "gazebo", "material")
@@ -58,7 +57,6 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     root = parse_xml(text, source)
     if root.tag != "robot":
         raise DescriptionError(root.location, f"the root element is <{root.tag}>", "allowed: <robot>")
-    _refuse_xacro(root)
     joint_nodes = root.find_all("joint")
     parents = {_role(joint, "child"): joint for joint in joint_nodes}
     nodes = [link for link in root.find_all("link") if link.name() != "world"]
@@ -105,13 +103,6 @@ def collision_name(name: str, link: str, index: int) -> str:
         index: Index of the <collision> in the link, from 0.
     """
     return name or (f"{link}_collision_{index}" if index else f"{link}_collision")
-
-
-def _refuse_xacro(node: XmlNode) -> None:
-    if node.tag.startswith(XACRO_TAGS):
-        raise DescriptionError(node.location, "is xacro", "allowed: URDF; expand the file with xacro first")
-    for child in node.children:
-        _refuse_xacro(child)
 
 
 def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:

@@ -173,12 +173,22 @@ def parse_xml(text: str, source: str) -> XmlNode:
         The root element.
 
     Raises:
-        DescriptionError: The text is not well-formed XML, or has a DOCTYPE.
+        DescriptionError: The text is not well-formed XML, has a DOCTYPE, or is unexpanded xacro.
     """
     try:
-        return _node(xml_text.parse(_with_valid_start(text), source), source)
+        root = _node(xml_text.parse(_with_valid_start(text), source), source)
     except xml_text.XmlError as error:
         raise DescriptionError(error.location, error.found, error.allowed) from error
+    _refuse_xacro(root)
+    return root
+
+
+def _refuse_xacro(node: XmlNode) -> None:
+    name = node.attributes.get("name", "")
+    if node.tag.startswith(xml_text.XACRO_TAGS) or "${" in name or "$(" in name:
+        raise DescriptionError(node.location, "is xacro", "allowed: URDF or SDF; expand the file with xacro first")
+    for child in node.children:
+        _refuse_xacro(child)
 
 
 def _with_valid_start(text: str) -> str:
