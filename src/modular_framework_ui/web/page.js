@@ -119,7 +119,7 @@ function sentence(task) {
     case "succeeded": return `The task succeeded${ending}.`;
     case "failed": return `The task failed${ending}. ${task.reason}`;
     case "lost": return task.reason;
-    default: return `The task ended${ending}. Its topics do not tell whether it succeeded.`;
+    default: return `The task ended${ending}. Its topics do not state whether it succeeded.`;
   }
 }
 
