@@ -10,6 +10,7 @@ from typing import Any
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
 from modular_framework_benchmark.experiments.ros_launch_files import (
     ARGUMENTS,
+    MOVE_GROUP,
     REGIONS,
     argument_faults,
     named_entry_faults,
@@ -45,7 +46,7 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
 )
 from modular_framework_ros.allowed_names import closest, listing, nearest
 
-MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
+DESCRIPTION = "robot_description"
 PIPELINES = "planning_pipelines"
 RUN_TASK = "run_task"
 

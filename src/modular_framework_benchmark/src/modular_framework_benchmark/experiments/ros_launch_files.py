@@ -66,6 +66,18 @@ def sensor_faults(launch: LaunchPreview) -> Iterator[LaunchFault]:
 
 def argument_faults(launch: LaunchPreview, robot: RobotNames) -> Iterator[LaunchFault]:
     """Yields invalid regions, starting poses and manipulator prefixes."""
+    yield from _region_faults(launch)
+    for node in launch.nodes:
+        if node.executable == SIMULATION:
+            yield from _starting_pose_faults(str(launch.parameters.get(f"{node.name}/starting_pose") or ""), robot)
+    name = "manipulator_prefix"
+    prefix = str(launch.parameters.get(f"/{name}") or "")
+    if prefix and robot.links and not manipulator_links(robot.links, prefix):
+        hint = f"no link name contains it; the links are: {', '.join(robot.links)}"
+        yield LaunchFault(name, f"argument '{name}' is '{prefix}', but {hint}", ARGUMENTS)
+
+
+def _region_faults(launch: LaunchPreview) -> Iterator[LaunchFault]:
     regions = launch.parameters.get(REGIONS, launch.below(REGIONS))
     named = regions if isinstance(regions, Mapping) else {"": regions}
     for region, spans in named.items():
@@ -73,22 +85,18 @@ def argument_faults(launch: LaunchPreview, robot: RobotNames) -> Iterator[Launch
             place = f"region '{region}'" if region else "the value"
             text = f"argument 'regions': {place} is {spans!r}; allowed: spans [LOW, HIGH] [m] with LOW < HIGH, such as"
             yield LaunchFault("regions", f"{text} {{NAME: {{x: [0.1, 0.2], y: [0.4, 0.5]}}}}", ARGUMENTS)
-    for node in launch.nodes:
-        name = "simulation_starting_pose"
-        text = str(launch.parameters.get(f"{node.name}/starting_pose") or "") if node.executable == SIMULATION else ""
-        try:
-            unknown = [joint for joint in parse_starting_pose(text) if robot.joints and joint not in robot.joints]
-        except DescriptionError as error:
-            yield LaunchFault(name, f"argument '{name}': {error}", ARGUMENTS)
-            continue
-        for joint in unknown:
-            hint = f"{listing(robot.movable_joints)}{nearest(joint, robot.movable_joints)}"
-            yield LaunchFault(name, f"argument '{name}' names no joint: '{joint}'; {hint}", ARGUMENTS)
-    name = "manipulator_prefix"
-    prefix = str(launch.parameters.get(f"/{name}") or "")
-    if prefix and robot.links and not manipulator_links(robot.links, prefix):
-        hint = f"no link name contains it; the links are: {', '.join(robot.links)}"
-        yield LaunchFault(name, f"argument '{name}' is '{prefix}', but {hint}", ARGUMENTS)
+
+
+def _starting_pose_faults(text: str, robot: RobotNames) -> Iterator[LaunchFault]:
+    name = "simulation_starting_pose"
+    try:
+        unknown = [joint for joint in parse_starting_pose(text) if robot.joints and joint not in robot.joints]
+    except DescriptionError as error:
+        yield LaunchFault(name, f"argument '{name}': {error}", ARGUMENTS)
+        return
+    for joint in unknown:
+        hint = f"{listing(robot.movable_joints)}{nearest(joint, robot.movable_joints)}"
+        yield LaunchFault(name, f"argument '{name}' names no joint: '{joint}'; {hint}", ARGUMENTS)
 
 
 def named_entry_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:
