@@ -17,10 +17,17 @@ from sample_experiment import sample_description, sample_episodes, sample_record
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
 from modular_framework_benchmark.episodes.snapshot import RUN_ID_VARIABLE, MachineLoad, reference_s
+from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
+from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
+from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
-from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.metrics.measurements import ComponentReport
+from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
+from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.experiment import Factor
 from modular_framework_benchmark.records.level_digests import combination_key, digests_text
+from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_benchmark.reports.report_source import open_source
 from modular_framework_benchmark.reports.run_record import warnings_of
 from modular_framework_benchmark.results.database import open_database
@@ -111,6 +118,43 @@ def test_compare_marks_settings_and_files_that_differ_and_not_those_that_a_facto
     shown = capsys.readouterr().out
     assert "settings.parameters./robot_speed_factor: before 1.0; after 0.5" in shown
     assert "other content of file a.world" in shown and "settings.method" not in shown
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        (PlanningSettings(), PlanningSettings(planning_time=1.0), "settings.planning_time: before 5.0; after 1.0"),
+        (KinematicsSettings(), KinematicsSettings(timeout=0.5), "settings.timeout: before 0.05; after 0.5"),
+        (
+            GraspSettings(method_parameters={"yaw_step": 0.1}),
+            GraspSettings(method_parameters={"yaw_step": 0.2}),
+            "settings.method_parameters.yaw_step: before 0.1; after 0.2",
+        ),
+    ],
+    ids=["planning", "kinematics", "grasps"],
+)
+def test_compare_marks_settings_that_differ_in_the_modes_without_simulation(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    before: EpisodeSettings,
+    after: EpisodeSettings,
+    text: str,
+) -> None:
+    def run(name: str, settings: EpisodeSettings) -> str:
+        episodes = [replace(spec, settings=settings) for spec in sample_episodes(2)]
+        report = ComponentReport("planning", "boxes", True, "", 0.0, 1.0, wall_s=1.0, ran=UsedSoftware())
+        with open_database(tmp_path / name, create=True) as database:
+            number = database.add_experiment(sample_description(), episodes)
+            for spec in episodes:
+                record = measured_record(
+                    spec, EpisodeStatus.SUCCEEDED, "", report=report, folder=tmp_path, watch=Stopwatch()
+                )
+                assert record.snapshot["seed"] == spec.seed
+                database.write(number, record)
+        return str(tmp_path / name)
+
+    assert compare([run("before.db", before), run("after.db", after)]) == 0
+    assert text in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
-from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.episodes.snapshot import MachineLoad, common_parts
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.failure_classes import failure_class
@@ -30,7 +30,7 @@ from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.progress import Progress, progress_of
 from modular_framework_benchmark.predicates.stages import SimulatedStage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.episode_settings import EpisodeSettings, as_json, from_json
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings, from_json
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
@@ -197,12 +197,7 @@ def _read_hand_track(folder: Path, joints: JointSamples | None) -> ObjectTrack |
 
 def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
     return {
-        **versions(),
-        "machine": machine(),
-        "reference_s": reference_s(),
-        **MachineLoad.now().since(end.load),
-        "seed": end.spec.seed,
-        "settings": as_json(end.spec.settings),
+        **common_parts(end.spec, end.load),
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
         **{key: end.answer[key] for key in SNAPSHOT_KEYS if end.answer.get(key)},

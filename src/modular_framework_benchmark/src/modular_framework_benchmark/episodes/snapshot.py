@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Snapshot of an episode's environment: versions, machine, load."""
+"""Parts of a snapshot that the episodes of all modes record: versions, machine, load, seed and settings."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ import numpy as np
 import psutil
 import rospkg
 
+from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_core.launching.launch_session import environment_of
 
 RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
@@ -143,6 +145,23 @@ class MachineLoad:
             "busy_s": round(self.busy_s - before.busy_s, 2),
             "others_share": round(others_s / available_s, 3),
         }
+
+
+def common_parts(spec: EpisodeSpec, load: MachineLoad) -> dict[str, Any]:
+    """Returns the snapshot parts that every mode records.
+
+    Args:
+        spec: Specification of the episode.
+        load: Load of the machine at the start of the episode.
+    """
+    return {
+        **versions(),
+        "machine": machine(),
+        "reference_s": reference_s(),
+        **MachineLoad.now().since(load),
+        "seed": spec.seed,
+        "settings": as_json(spec.settings),
+    }
 
 
 def _others_s() -> dict[int, float]:

@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.episodes.snapshot import MachineLoad, common_parts
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.metrics.registry import MetricError, measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
@@ -95,10 +95,7 @@ def measured_record(
         metrics={name: None if invalid_cause else value for name, value in measured.values.items()},
         spans=(span,),
         snapshot={
-            **versions(),
-            "machine": machine(),
-            "reference_s": reference_s(),
-            **MachineLoad.now().since(watch.load),
+            **common_parts(spec, watch.load),
             **report.ran.as_json(),
             **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
         },
