@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Calls services and actions of other nodes; every wait has a timeout and ends when the task is stopped.
 
-All timeouts are in real time, since a paused or crashed simulation stops the ROS clock.
+Timeouts are in real time, since a paused or crashed simulation stops the ROS clock. The wait for the end of a goal
+counts the slower of real time and the ROS clock, since a simulation on a loaded machine moves slowly.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -29,9 +31,52 @@ PROBE_TIME_S = 0.2
 CANCEL_WAIT_S = 0.5
 """Maximum wait for the result of a cancelled goal [s]; a task must end within a second of a stop request."""
 
+STOPPED_CLOCK_S = 1.0
+"""Real time without a change of the ROS clock after which the clock counts as stopped [s]."""
+
 
 class CallError(RuntimeError):
     """A service or an action did not respond; the message gives its name and the time waited, or the stop request."""
+
+
+class MotionTimeout:
+    """Counts the slower of real time and the ROS clock, from its creation.
+
+    A simulation slower than real time needs more real time for the same motion, and a faster one leaves a node less
+    simulated time to respond. While the ROS clock stands still, because the world is paused or time is held, real time
+    counts alone. A reset of the clock to an earlier time counts nothing.
+
+    Args:
+        limit_s: Timeout [s].
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        self._passed_s = 0.0
+        self._real_s, self._clock_s = time.monotonic(), _clock_s()
+
+    def is_exceeded(self) -> bool:
+        """Returns whether the timeout has elapsed."""
+        real_s, clock_s = time.monotonic(), _clock_s()
+        real_step_s = real_s - self._real_s
+        if clock_s is None:
+            step_s = real_step_s
+        elif clock_s != self._clock_s:
+            step_s = min(real_step_s, max(0.0, clock_s - (self._clock_s or 0.0)))
+        elif real_step_s > STOPPED_CLOCK_S:
+            step_s = real_step_s
+        else:
+            return self._passed_s >= self.limit_s
+        self._passed_s += step_s
+        self._real_s, self._clock_s = real_s, clock_s
+        return self._passed_s >= self.limit_s
+
+
+def _clock_s() -> float | None:
+    """Returns the time of the simulation's clock [s]; None without one."""
+    if rospy.rostime.is_wallclock() or not rospy.rostime.is_rostime_initialized():
+        return None
+    return float(rospy.get_time())
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float, period_s: float = POLL_PERIOD_S) -> bool:
@@ -181,12 +226,13 @@ def wait_for_result(
 
     Args:
         client: Client that has sent the goal.
-        timeout_s: Maximum wait [s of real time].
+        timeout_s: Maximum wait [s of the slower of real time and the ROS clock].
         stop_requested: Function polled during the wait; the goal is cancelled when it returns True.
 
     Returns:
         The final goal status: PREEMPTED after a stop request, LOST after a timeout or if a node is frozen.
     """
+    timeout = MotionTimeout(timeout_s)
     stopped, watched_from_s = False, time.monotonic() + WATCHED_AFTER_S
 
     def has_ended() -> bool:
@@ -199,7 +245,7 @@ def wait_for_result(
         stopped = stopped or stop_requested()
         return stopped or has_ended() or (time.monotonic() > watched_from_s and bool(frozen_nodes()))
 
-    if wait_until(is_finished, timeout_s) and not stopped and has_ended():
+    if wait_until(lambda: is_finished() or timeout.is_exceeded(), math.inf) and not stopped and has_ended():
         return int(client.get_state())
     client.cancel_goal()
     wait_until(has_ended, CANCEL_WAIT_S)

@@ -18,8 +18,6 @@ from modular_framework_ros.calls import wait_for_action, wait_for_result
 from modular_framework_urdf.urdf_reader import read_urdf
 
 ACTION_TIMEOUT_S = 30.0
-MIN_REAL_TIME_FACTOR = 0.05
-"""Minimum ratio of simulated to real time, on a busy machine."""
 
 
 class ShakeError(RuntimeError):
@@ -52,7 +50,7 @@ def shake(samples: Samples, duration_s: float) -> float:
     ]
     started_s = rospy.get_time()
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
-    if wait_for_result(client, ACTION_TIMEOUT_S + duration_s / MIN_REAL_TIME_FACTOR) != GoalStatus.SUCCEEDED:
+    if wait_for_result(client, ACTION_TIMEOUT_S + duration_s) != GoalStatus.SUCCEEDED:
         raise ShakeError(f"controller '{controller}' did not shake the arm: {client.get_goal_status_text()}")
     return started_s
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterable
 import rospy
 from sensor_msgs.msg import JointState
 
-from modular_framework_ros.calls import wait_until
+from modular_framework_ros.calls import MotionTimeout, wait_until
 from modular_framework_ros.simulated_time import SimulatedTime
 
 REST_SPEED = 0.02  # [rad/s or m/s]
@@ -70,7 +71,8 @@ class JointMonitor:
         joints, start_s = tuple(names), time.monotonic()
         if self._time.enabled:
             return self._wait_for_rest_in_held_time(joints, stop_requested)
-        wait_until(lambda: stop_requested() or self._at_rest_since(joints, start_s), REST_TIMEOUT_S)
+        timeout = MotionTimeout(REST_TIMEOUT_S)
+        wait_until(lambda: stop_requested() or self._at_rest_since(joints, start_s) or timeout.is_exceeded(), math.inf)
         return self._at_rest_since(joints, start_s)
 
     def _wait_for_rest_in_held_time(self, joints: tuple[str, ...], stop_requested: Callable[[], bool]) -> bool:

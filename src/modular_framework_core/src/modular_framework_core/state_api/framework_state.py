@@ -22,13 +22,13 @@ from __future__ import annotations
 
 import functools
 import threading
-import time
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
 import smach
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.option_checks import checks_options
+from modular_framework_ros.calls import MotionTimeout
 from modular_framework_ros.stop_requests import stoppable
 
 DEFAULT_OUTCOMES = ("success", "fail")
@@ -137,17 +137,17 @@ class FrameworkState(smach.State):
 
         Args:
             condition: Function evaluated every ``period_s`` seconds.
-            timeout_s: Timeout [s, wall time]; None for no timeout.
+            timeout_s: Timeout [s of the slower of real time and the ROS clock]; None for no timeout.
             period_s: Polling period [s].
 
         Returns:
             Whether the condition held. If False, ``stop_requested()`` distinguishes preemption from a timeout.
         """
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        timeout = None if timeout_s is None else MotionTimeout(timeout_s)
         while not self.stop_requested():
             if condition():
                 return True
-            if deadline is not None and time.monotonic() >= deadline:
+            if timeout is not None and timeout.is_exceeded():
                 return False
             self._preempt_event.wait(period_s)
         return False

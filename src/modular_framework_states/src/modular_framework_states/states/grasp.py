@@ -11,7 +11,7 @@ from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
-from modular_framework_ros.calls import CallError, wait_until
+from modular_framework_ros.calls import CallError
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
 from modular_framework_states.held_objects import held_objects
 from modular_framework_states.manager_clients import ManagerError, selected_or_named
@@ -77,4 +77,4 @@ class Grasp(FrameworkState):
         def is_attached() -> bool:
             return any(is_named(held, name) for held in held_objects())
 
-        return wait_until(lambda: self.preempt_requested() or is_attached(), SCENE_TIMEOUT_S, SCENE_PERIOD_S)
+        return self.wait_until(is_attached, SCENE_TIMEOUT_S, SCENE_PERIOD_S)

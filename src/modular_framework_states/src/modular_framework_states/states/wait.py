@@ -21,7 +21,7 @@ class Wait(FrameworkState):
 
     Args:
         duration: Duration [s].
-        timeout: Maximum wait in real time [s], in case the clock stops; None for three times the duration plus ten
+        timeout: Maximum wait if the clock stops [s of real time]; None for three times the duration plus ten
             seconds.
         **keys: Outcomes and userdata keys of any state.
     """

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any, Unpack
 
@@ -13,6 +12,7 @@ import rospy
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
+from modular_framework_ros.calls import MotionTimeout
 from modular_framework_states.message_filling import FillingError, difference, with_userdata
 from modular_framework_states.responses import MessageFields
 
@@ -52,9 +52,9 @@ class WaitForMessage(FrameworkState):
             self._wanted = with_userdata(self._expected, userdata)
         except FillingError as error:
             return self.fail(f"message of topic '{self._topic}': {error}")
-        end = None if self._timeout_s is None else time.monotonic() + self._timeout_s
+        timeout = None if self._timeout_s is None else MotionTimeout(self._timeout_s)
         name = rospy.resolve_name(self._topic)
-        arrived = self._wait(lambda: bool(published_type(name)), end, 0.1) and self._receive(name, end)
+        arrived = self._wait(lambda: bool(published_type(name)), timeout, 0.1) and self._receive(name, timeout)
         if not arrived:
             problem = "no message as expected" if self._expected else "no message"
             return self.fail(f"{problem} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
@@ -62,7 +62,7 @@ class WaitForMessage(FrameworkState):
             userdata[MESSAGE_KEY] = self._found[0]
         return self.succeed()
 
-    def _receive(self, name: str, end: float | None) -> bool:
+    def _receive(self, name: str, timeout: MotionTimeout | None) -> bool:
         """Subscribes with the type of the publisher, since all subscribers of a node to a topic share one type."""
         kind = published_type(name)
         message_type = roslib.message.get_message_class(kind)
@@ -72,12 +72,15 @@ class WaitForMessage(FrameworkState):
         self._last_difference = "it has a publisher, but no message was sent"
         subscriber = rospy.Subscriber(name, message_type, self._on_message, queue_size=10)
         try:
-            return self._wait(lambda: bool(self._found), end)
+            return self._wait(lambda: bool(self._found), timeout)
         finally:
             subscriber.unregister()
 
-    def _wait(self, condition: Callable[[], bool], end: float | None, period_s: float = 0.02) -> bool:
-        return self.wait_until(condition, None if end is None else max(0.0, end - time.monotonic()), period_s)
+    def _wait(self, condition: Callable[[], bool], timeout: MotionTimeout | None, period_s: float = 0.02) -> bool:
+        def is_over() -> bool:
+            return condition() or (timeout is not None and timeout.is_exceeded())
+
+        return self.wait_until(is_over, None, period_s) and condition()
 
     def _on_message(self, message: Any) -> None:
         self._last_difference = difference(message, self._wanted)
