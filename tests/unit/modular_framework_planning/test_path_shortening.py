@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
-from modular_framework_planning.collision_detection.kernels.compiled_edges import new_memory
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
@@ -80,7 +79,7 @@ def test_the_compiled_test_of_edges_gives_the_path_that_single_tests_give(model:
         pose = pin.SE3(np.eye(3), np.array([0.6 * np.cos(angle), 0.6 * np.sin(angle), rng.uniform(1.0, 1.5)]))
         scene = scene.with_object(CollisionObject(f"box{number}", pose, ((Box(0.12, 0.12, 0.12), pin.SE3.Identity()),)))
     checker = ExactCollisionChecker(scene, group.indices)
-    motion = MotionChecker(checker, group.indices, scene.positions, STEP)
+    motion = MotionChecker(checker, group.indices, scene.positions)
     shorter = 0
     for seed in range(10):
         path = [scene.positions[group.indices]]
@@ -94,7 +93,7 @@ def test_the_compiled_test_of_edges_gives_the_path_that_single_tests_give(model:
             return motion.edge_is_free(first, second, STEP)
 
         assert checker.compiled_world is not None
-        compiled = CompiledEdgeTest(motion.edges(STEP), new_memory(len(group.joints)), checker.compiled_world)
+        compiled = CompiledEdgeTest(motion.edges(STEP), checker.compiled_world)
         short = shorten(vertices, is_free, np.inf, np.random.default_rng(seed), compiled)
         assert np.array_equal(short, shorten(vertices, is_free, np.inf, np.random.default_rng(seed)))
         assert all(is_free(first, second) for first, second in zip(short[:-1], short[1:], strict=True))

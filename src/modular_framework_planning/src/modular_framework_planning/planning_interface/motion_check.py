@@ -6,51 +6,30 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_edges import (
-    BLOCKED,
-    FREE,
-    UNKNOWN,
-    EdgeMemory,
-    GroupEdges,
-    new_memory,
-    recall,
-    remember,
-)
+from modular_framework_planning.collision_detection.kernels.compiled_edges import GroupEdges
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
-from modular_framework_planning.trajectory_processing.compiled_polylines import pieces_on_edges
-
-MIN_LOOKUP_STEPS = 8  # shorter pieces are checked again, which is faster than a look-up among the known edges
-EDGE_TOLERANCE = 1.0e-8  # maximum distance between an edge and a point on this edge [rad or m]
 
 
 class MotionChecker:
     """Checks motions of a group while all other joints stay at fixed positions.
 
-    Finely checked edges are remembered; pieces of a path on a free edge are not checked again.
-
     Attributes:
         checker: Collision checker of the scene.
-        memory: Remembered edges.
     """
 
-    def __init__(
-        self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array, remembered_step: float = 0.0
-    ) -> None:
+    def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
         """Stores the checker and the group.
 
         Args:
             checker: Collision checker of the scene.
             indices: Indices of the group's joints.
             rest: Positions of the whole robot, used for the joints outside the group [rad or m].
-            remembered_step: Maximum step of the checks whose edges are remembered [rad or m].
         """
         self.checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
         self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
-        self._remembered_step = remembered_step
-        self.memory: EdgeMemory = new_memory(len(indices))
         self._group_map: tuple[Array, Array] | None = None  # see GroupEdges
         model = checker.model
         leaders = {int(index) for index in indices}
@@ -85,15 +64,6 @@ class MotionChecker:
             end: Joint vector of the group [rad or m].
             step: Maximum joint displacement between checked states [rad or m].
         """
-        if step > self._remembered_step:
-            return self._edge_is_free(start, end, step)
-        verdict = recall(self.memory, start, end, step)
-        if verdict == UNKNOWN:
-            verdict = FREE if self._edge_is_free(start, end, step) else BLOCKED
-            remember(self.memory, start, end, step, verdict)
-        return bool(verdict == FREE)
-
-    def _edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         if self._mimic_leaders:
             return self.checker.path_is_free(self.full_path(np.array([start, end])), step, 1)
         edge = self._edge
@@ -101,26 +71,13 @@ class MotionChecker:
         return self.checker.path_is_free(edge, step, 1)
 
     def polyline_is_free(self, polyline: Array, step: float) -> bool:
-        """Checks that a polyline is free, including its start, without using remembered edges."""
+        """Checks that a polyline is free, including its start."""
         return self.checker.path_is_free(self.full_path(polyline), step)
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding state of a polyline, including its start, or None."""
-        for piece in self._unchecked_pieces(polyline, step):
-            state = self.checker.colliding_state(self.full_path(piece), step)
-            if state is not None:
-                return state[self._indices]
-        return None
-
-    def _unchecked_pieces(self, polyline: Array, step: float) -> list[Array]:
-        """Returns the polyline without its pieces on free edges; all vertices remain."""
-        if step < self._remembered_step:
-            return [polyline]
-        is_free = self.memory.verdicts == FREE
-        known = pieces_on_edges(
-            np.ascontiguousarray(polyline), self.memory.ends, is_free, MIN_LOOKUP_STEPS * step, EDGE_TOLERANCE
-        )
-        return np.split(polyline, known + 1) if len(known) else [polyline]
+        state = self.checker.colliding_state(self.full_path(polyline), step)
+        return None if state is None else state[self._indices]
 
     def full_path(self, path: Array) -> Array:
         """Returns the positions of the whole robot for joint vectors of the group, shape (n, joints)."""

@@ -235,7 +235,7 @@ class PlanningProblem:
     def with_start(self, start: Array) -> PlanningProblem:
         """Returns the problem with a different start (positions of the whole robot)."""
         request = replace(self.request, scene=self.scene.with_positions(start))
-        motion = MotionChecker(self.checker, self.group.indices, start, self.settings.finest_step)
+        motion = MotionChecker(self.checker, self.group.indices, start)
         return replace(self, request=request, start=start, _goals=[], motion=motion)
 
 

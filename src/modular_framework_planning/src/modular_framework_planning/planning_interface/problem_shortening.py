@@ -20,5 +20,5 @@ def shorten_path(problem: PlanningProblem, path: Array, deadline: float, rng: np
         rng: Random generator; None to only remove vertices.
     """
     fine, world = problem.settings.finest_step, problem.compiled_world
-    compiled = None if world is None else CompiledEdgeTest(problem.motion.edges(fine), problem.motion.memory, world)
+    compiled = None if world is None else CompiledEdgeTest(problem.motion.edges(fine), world)
     return shorten(path, lambda first, second: problem.edge_is_valid(first, second, fine), deadline, rng, compiled)

@@ -261,7 +261,7 @@ class PlanningPipeline:
             group=group,
             start=start,
             checker=checker,
-            motion=MotionChecker(checker, group.indices, start, self.settings.finest_step),
+            motion=MotionChecker(checker, group.indices, start),
             kinematics=self._kinematics,
             settings=self.settings,
             max_velocity=velocity,

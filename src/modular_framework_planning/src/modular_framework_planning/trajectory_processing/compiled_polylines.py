@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Polylines of joint vectors: removal of redundant vertices, and pieces that lie on known edges.
+"""Removal of redundant vertices from polylines of joint vectors.
 
-The functions are compiled, because the overhead of NumPy calls dominates for a few vertices.
+The function is compiled, because the overhead of NumPy calls dominates for a few vertices.
 """
 
 from __future__ import annotations
@@ -49,56 +49,6 @@ def needed_vertices(path: Array, tolerance: float) -> NDArray[np.int64]:
     return kept[:kept_count]
 
 
-@njit(cache=True, nogil=True)
-def pieces_on_edges(
-    path: Array, edges: Array, is_selected: NDArray[np.bool_], min_change: float, tolerance: float
-) -> NDArray[np.int64]:
-    """Returns the indices of the pieces of a polyline that lie on a selected edge.
-
-    Args:
-        path: Polyline, shape (n, joints) [rad or m].
-        edges: Start and end of each edge, shape (m, 2, joints) [rad or m].
-        is_selected: Whether each edge is selected, shape (m,).
-        min_change: Joint displacement up to which a piece is left out [rad or m].
-        tolerance: Maximum joint distance of the ends of a piece from an edge [rad or m].
-    """
-    joints = path.shape[1]
-    pieces, kept_count = np.empty(max(len(path) - 1, 0), np.int64), 0
-    for index in range(len(path) - 1):
-        max_change = 0.0
-        for joint in range(joints):
-            max_change = max(max_change, abs(path[index + 1, joint] - path[index, joint]))
-        if max_change <= min_change:
-            continue
-        for edge in range(len(edges)):
-            if (
-                is_selected[edge]
-                and _is_on_edge(path[index], edges[edge], tolerance)
-                and _is_on_edge(path[index + 1], edges[edge], tolerance)
-            ):
-                pieces[kept_count] = index
-                kept_count += 1
-                break
-    return pieces[:kept_count]
-
-
-@njit(cache=True, nogil=True)
-def _is_on_edge(point: Array, edge: Array, tolerance: float) -> bool:
-    """Returns whether no joint of a point is farther than `tolerance` from the nearest point of an edge."""
-    squared_length, projection = 0.0, 0.0
-    for joint in range(len(point)):
-        offset = edge[1, joint] - edge[0, joint]
-        squared_length += offset * offset
-        projection += offset * (point[joint] - edge[0, joint])
-    fraction = min(max(projection / squared_length, 0.0), 1.0) if squared_length > 0.0 else 0.0
-    for joint in range(len(point)):
-        if not abs(edge[0, joint] + fraction * (edge[1, joint] - edge[0, joint]) - point[joint]) <= tolerance:
-            return False
-    return True
-
-
 def warm_up() -> None:
-    """Compiles the kernels of this module, or loads them from the cache."""
-    path = np.array([[0.0, 0.0], [1.0, 0.0]])
-    needed_vertices(path, 0.0)
-    pieces_on_edges(path, path[None], np.ones(1, dtype=bool), 0.0, 0.0)
+    """Compiles the kernel of this module, or loads it from the cache."""
+    needed_vertices(np.array([[0.0, 0.0], [1.0, 0.0]]), 0.0)

@@ -21,12 +21,9 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.collision_detection.kernels.compiled_edges import (
     FREE,
     UNKNOWN,
-    EdgeMemory,
     GroupEdges,
     check_edge,
     new_edge,
-    recall,
-    remember,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
@@ -255,15 +252,12 @@ def begin(shortening: Shortening) -> None:
 
 
 @njit(cache=True, nogil=True)
-def shorten_in(
-    shortening: Shortening, edges: GroupEdges, memory: EdgeMemory, verdict: int, *world: NDArray[Any]
-) -> int:
+def shorten_in(shortening: Shortening, edges: GroupEdges, verdict: int, *world: NDArray[Any]) -> int:
     """Shortens a path with compiled edge checks.
 
     Args:
         shortening: Path, initialised by `begin`; changed in place.
         edges: Step of the edge checks, and map from the group to the robot.
-        memory: Cached edge checks; changed in place.
         verdict: FREE or BLOCKED for the edge on which the last call returned UNDECIDED; otherwise UNKNOWN.
         *world: Arrays from `compiled_collision.arguments`.
 
@@ -273,9 +267,7 @@ def shorten_in(
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(edges)
-    status = _shorten_in(
-        borrowed(shortening), borrowed(edges), borrowed(memory), verdict, bodies, borrowed(edge), borrowed(workspace)
-    )
+    status = _shorten_in(borrowed(shortening), borrowed(edges), verdict, bodies, borrowed(edge), borrowed(workspace))
     release(workspace, edge)
     return status
 
@@ -284,7 +276,6 @@ def shorten_in(
 def _shorten_in(
     shortening: Shortening,
     edges: GroupEdges,
-    memory: EdgeMemory,
     verdict: int,
     world: World,
     samples: Samples,
@@ -297,11 +288,8 @@ def _shorten_in(
         if not next_edge(shortening):
             return FINISHED
         start, end = shortening.edge[0], shortening.edge[1]
-        verdict = recall(memory, start, end, edges.step)
+        verdict = check_edge(edges, world, start, end, samples, no_rows, workspace)
         if verdict == UNKNOWN:
-            verdict = check_edge(edges, world, start, end, samples, no_rows, workspace)
-            if verdict == UNKNOWN:
-                return UNDECIDED
-            remember(memory, start, end, edges.step, verdict)
+            return UNDECIDED
         apply_verdict(shortening, verdict == FREE)
     return PAUSED

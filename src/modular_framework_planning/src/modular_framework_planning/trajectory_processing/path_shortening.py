@@ -15,11 +15,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_edges impor
     BLOCKED,
     FREE,
     UNKNOWN,
-    EdgeMemory,
     GroupEdges,
-    new_memory,
-    recall,
-    remember,
 )
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
@@ -47,12 +43,10 @@ class CompiledEdgeTest(NamedTuple):
 
     Attributes:
         edges: Mapping and step of the edge checks.
-        memory: Remembered edges, shared with the EdgeTest.
         world: World of the compiled checks.
     """
 
     edges: GroupEdges
-    memory: EdgeMemory
     world: World
 
 
@@ -103,7 +97,7 @@ def _shorten_compiled(
     """Shortens a path until it is done or the time is over."""
     world, verdict = arguments(compiled.world), UNKNOWN
     while time.monotonic() <= deadline:
-        status = shorten_in(shortening, compiled.edges, compiled.memory, verdict, *world)
+        status = shorten_in(shortening, compiled.edges, verdict, *world)
         if status == FINISHED:
             return
         verdict = UNKNOWN
@@ -169,7 +163,5 @@ def warm_up(world: World, positions: Array) -> None:
         world: World of any scene.
         positions: Positions of the whole robot [rad or m].
     """
-    state, memory = np.zeros(1), new_memory(1)
-    remember(memory, state, state, 0.1, recall(memory, state, state, 0.1))
-    compiled = CompiledEdgeTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), memory, world)
+    compiled = CompiledEdgeTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), world)
     shorten(np.array([[0.0], [1.0], [0.0]]), lambda first, second: False, np.inf, np.random.default_rng(), compiled)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collision checks of edges (straight joint motions) for compiled planners, and a cache of their results."""
+"""Collision checks of edges (straight joint motions) for compiled planners."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.geometry.spatial import Array
 
 UNKNOWN, FREE, BLOCKED = 0, 1, 2  # results of an edge check
-MEMORY_CAPACITY = 256  # number of cached edges; a look-up takes less than 1 % of a check
 
 
 class GroupEdges(NamedTuple):
@@ -39,71 +38,6 @@ class GroupEdges(NamedTuple):
     rest: Array
     joint_map: Array
     step: float
-
-
-class EdgeMemory(NamedTuple):
-    """Ring buffer of the latest edge checks.
-
-    Attributes:
-        ends: Start and end joint vector of each edge, shape (capacity, 2, joints) [rad or m].
-        steps: Step of each check, shape (capacity,) [rad or m].
-        verdicts: Result per cached edge, FREE or BLOCKED, shape (capacity,).
-        total: Number of edges ever stored, shape (1,).
-    """
-
-    ends: Array
-    steps: Array
-    verdicts: NDArray[np.int64]
-    total: NDArray[np.int64]
-
-
-def new_memory(joints: int) -> EdgeMemory:
-    """Returns an empty memory for a group with this number of joints."""
-    return EdgeMemory(
-        np.empty((MEMORY_CAPACITY, 2, joints)),
-        np.empty(MEMORY_CAPACITY),
-        np.zeros(MEMORY_CAPACITY, np.int64),
-        np.zeros(1, np.int64),
-    )
-
-
-@njit(cache=True, nogil=True)
-def recall(memory: EdgeMemory, start: Array, end: Array, step: float) -> int:
-    """Returns the cached result of an edge check: FREE, BLOCKED, or UNKNOWN.
-
-    Args:
-        memory: Edge memory.
-        start: Joint vector at the start, shape (joints,) [rad or m].
-        end: Joint vector at the end, shape (joints,) [rad or m].
-        step: Step of the check [rad or m].
-    """
-    ends, steps, verdicts, total = memory
-    for index in range(min(total[0], len(verdicts))):
-        is_same = steps[index] == step
-        for joint in range(len(start)):
-            is_same = is_same and ends[index, 0, joint] == start[joint] and ends[index, 1, joint] == end[joint]
-            if not is_same:
-                break
-        if is_same:
-            return verdicts[index]
-    return UNKNOWN
-
-
-@njit(cache=True, nogil=True)
-def remember(memory: EdgeMemory, start: Array, end: Array, step: float, verdict: int) -> None:
-    """Stores the result of an edge check.
-
-    Args:
-        memory: Edge memory.
-        start: Joint vector at the start, shape (joints,) [rad or m].
-        end: Joint vector at the end, shape (joints,) [rad or m].
-        step: Step of the check [rad or m].
-        verdict: FREE or BLOCKED.
-    """
-    ends, steps, verdicts, total = memory
-    index = total[0] % len(verdicts)
-    ends[index, 0], ends[index, 1], steps[index], verdicts[index] = start, end, step, verdict
-    total[0] += 1
 
 
 @njit(cache=True, nogil=True)
