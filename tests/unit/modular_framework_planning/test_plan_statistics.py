@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from plain_coal_checker import PlainCoalChecker
 from test_collision_checkers import SMALL_SRDF, SMALL_URDF
-from test_distance_field import random_world
+from test_many_solids import random_world
 from test_rrt_connect import COVER, GOAL, START, UPRIGHT, WALL, problem_in, scene_with, search
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
@@ -46,7 +46,7 @@ def refused(counts: np.ndarray) -> int:
 
 def test_every_check_is_counted_once_and_refused_as_often_as_plain_coal_refuses(small: RobotModel) -> None:
     rng = np.random.default_rng(1)
-    scene, _ = random_world(small, rng)
+    scene = random_world(small, rng)
     checker, plain, expected = ExactCollisionChecker(scene), PlainCoalChecker(scene), 0
     for _ in range(STATES):
         state = small.with_mimics(rng.uniform(small.lower, small.upper))
@@ -61,7 +61,7 @@ def test_every_check_is_counted_once_and_refused_as_often_as_plain_coal_refuses(
 
 def test_the_two_bodies_named_are_those_that_touch_most_often(small: RobotModel) -> None:
     rng = np.random.default_rng(2)
-    scene, _ = random_world(small, rng)
+    scene = random_world(small, rng)
     checker, plain, expected = ExactCollisionChecker(scene), PlainCoalChecker(scene), Counter[frozenset[str]]()
     assert checker.most_frequent_contact() is None
     while sum(expected.values()) < 60:

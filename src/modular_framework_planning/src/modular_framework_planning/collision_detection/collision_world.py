@@ -19,18 +19,9 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     World,
     arguments,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import (
-    NEAREST_SOLIDS,
-    DistanceField,
-)
 from modular_framework_planning.collision_detection.pair_arrays import PairMembers, pair_arrays
-from modular_framework_planning.collision_detection.reaches import max_reach
-from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
-
-FIELD_CELLS = 64  # cells along each axis of the distance field
-MAX_FIELD_REACH_M = 2.5  # distance from the origin of the planning frame to the sides of the field
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +60,9 @@ def compile_world(
         check_interrupt: Function called between shapes; raises an exception to stop.
     """
     bodies = scene_bodies(model, parts, pairs, check_interrupt)
-    tree, arrays, joined = whole_tree(model), bodies.arrays, pair_arrays(model, bodies, pairs)
-    reach = min(max_reach(tree, arrays), MAX_FIELD_REACH_M)
-    field = _field(arrays.kinds[joined.solids], arrays.sizes[joined.solids], arrays.poses[joined.solids], reach)
+    arrays, joined = bodies.arrays, pair_arrays(model, bodies, pairs)
     world = World(
-        tree=tree,
+        tree=whole_tree(model),
         joints=arrays.joints,
         poses=arrays.poses,
         roots=arrays.roots,
@@ -90,26 +79,8 @@ def compile_world(
         tables=joined.tables,
         table_joints=joined.table_joints,
         table_of=joined.table_of,
-        watched=joined.watched,
-        represented=joined.represented,
         counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
         refusals=np.zeros(len(joined.pairs), dtype=np.int64),
         common_joints=joined.common_joints,
-        field=field,
     )
     return CompiledWorld(world, arguments(world), joined.members, joined.uncompiled)
-
-
-def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:
-    """Returns an empty distance field, `reach` [m] to every side of the planning frame's origin."""
-    cells = (FIELD_CELLS if len(kinds) else 0,) * 3
-    per_cell = min(len(kinds), NEAREST_SOLIDS)
-    return DistanceField(
-        kinds=kinds,
-        sizes=sizes,
-        poses=poses,
-        grid=np.array([-reach, -reach, -reach, 2.0 * reach / FIELD_CELLS]),
-        is_filled=np.zeros(cells, dtype=bool),
-        nearest=np.empty((*cells, per_cell), dtype=np.int32),
-        distances=np.empty((*cells, per_cell)),
-    )

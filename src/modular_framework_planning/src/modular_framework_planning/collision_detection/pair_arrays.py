@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -20,7 +19,7 @@ from modular_framework_planning.collision_detection.body_arrays import (
     link_groups,
 )
 from modular_framework_planning.collision_detection.collision_bodies import PAIR_CACHE_SIZE, WatchedPairs
-from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD, TABLE_CELLS, UNKNOWN
+from modular_framework_planning.collision_detection.kernels.compiled_collision import TABLE_CELLS, UNKNOWN
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
 from modular_framework_planning.collision_detection.kernels.compiled_reaches import common_joints
 from modular_framework_planning.geometry.spatial import Array
@@ -34,7 +33,6 @@ class PairArrays:
     """Pairs of bodies; World documents the fields that both classes have.
 
     Attributes:
-        solids: Bodies of the world in the distance field.
         members: Indices of the watched pairs that each pair represents.
         uncompiled: Indices of watched pairs without bounding geometry, which need the exact check at every state.
     """
@@ -45,10 +43,7 @@ class PairArrays:
     tables: NDArray[np.int8]
     table_joints: NDArray[np.int64]
     table_of: NDArray[np.int64]
-    watched: NDArray[np.int64]
-    represented: NDArray[np.int64]
     common_joints: NDArray[np.int64]
-    solids: NDArray[np.int64]
     members: PairMembers
     uncompiled: tuple[int, ...]
 
@@ -56,24 +51,21 @@ class PairArrays:
 class PairMembers:
     """Indices of the watched pairs that each pair of the arrays represents."""
 
-    def __init__(self, rows: NDArray[np.int64], indices: NDArray[np.int64], joined: NDArray[np.int64]) -> None:
+    def __init__(self, rows: NDArray[np.int64], indices: NDArray[np.int64]) -> None:
         """Stores the relation between pairs of the arrays and watched pairs.
 
         Args:
             rows: Pair of the arrays for each watched pair, -1 for none.
             indices: Watched pairs sorted by row, without pairs that have no row.
-            joined: Rows that each row at the end represents, shape (f, n).
         """
-        self._rows, self._indices, self._joined = rows, indices, joined
+        self._rows, self._indices = rows, indices
         self._ends = np.cumsum(np.bincount(rows[indices])) if len(indices) else np.zeros(0, np.int64)
 
     def row_of(self, index: int) -> int:
-        """Returns the pair of the arrays, never a field pair, that represents a watched pair."""
+        """Returns the pair of the arrays that represents a watched pair."""
         return int(self._rows[index])
 
     def __getitem__(self, row: int) -> tuple[int, ...]:
-        if row >= len(self._ends):
-            return tuple(index for single in self._joined[row - len(self._ends)].tolist() for index in self[single])
         return tuple(self._indices[self._ends[row - 1] if row else 0 : self._ends[row]].tolist())
 
 
@@ -126,25 +118,16 @@ def _pair_arrays(
     table_of = np.full(len(both), -1)
     table_of[list(keys)] = np.arange(len(keys))
     tables, table_joints = _tables(model, groups, tuple(keys.values()))
-    excess = _excess(bodies, both)
-    solids, represented = _field_pairs(bodies, both, margins, excess)
-    with_field = np.column_stack([first[represented[:, 0]], np.full(len(represented), FIELD)])
-    both = np.concatenate([both, with_field])
-    is_watched = np.ones(len(both), dtype=bool)
-    is_watched[represented] = False
     indices = np.argsort(kinds, kind="stable")[np.count_nonzero(~is_compiled) :]
     return PairArrays(
         pairs=both,
-        margins=np.concatenate([margins, margins[represented[:, 0]]]),
-        excess=np.concatenate([excess, excess[represented].max(axis=1)]),
+        margins=margins,
+        excess=_excess(bodies, both),
         tables=tables,
         table_joints=table_joints,
-        table_of=np.concatenate([table_of, np.full(len(represented), -1)]),
-        watched=np.flatnonzero(is_watched),
-        represented=represented,
+        table_of=table_of,
         common_joints=common_joints(both, bodies.joints.astype(np.int64), whole_tree(model).parents),
-        solids=solids,
-        members=PairMembers(kinds, indices, represented),
+        members=PairMembers(kinds, indices),
         uncompiled=tuple(np.flatnonzero(~is_compiled).tolist()),
     )
 
@@ -237,33 +220,3 @@ def _tables(
     """
     joints = np.array([(*key[2:], -1)[:2] for key in keys], dtype=np.int64).reshape(-1, 2)
     return np.full((len(keys), TABLE_CELLS, TABLE_CELLS), UNKNOWN, dtype=np.int8), joints
-
-
-def _field_pairs(
-    bodies: _Bodies, both: NDArray[np.int64], margins: Array, excess: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Chooses the solids of the world for the distance field that most moving bodies are checked against.
-
-    Args:
-        bodies: Bodies of the scene.
-        both: Indices of the two bodies of each pair, shape (n, 2).
-        margins: Minimum distances, shape (n,) [m].
-        excess: Maximum distances of bounding geometries outside the bodies, see World; shape (n,) [m].
-
-    Returns:
-        The bodies in the field, and for each body checked against the field a row with its pairs.
-    """
-    is_plain = (bodies.joints < 0.0) & (bodies.is_solid > 0.0)
-    chosen_pairs = np.flatnonzero(is_plain[both[:, 1]] & np.isfinite(excess))
-    moving_of, solid_of = both[chosen_pairs].T
-    pair_of = np.full((len(is_plain), len(is_plain)), -1)
-    pair_of[moving_of, solid_of] = chosen_pairs
-    solids, moving = np.flatnonzero(is_plain), np.array(list(dict.fromkeys(moving_of.tolist())), dtype=np.int64)
-    counts = Counter(row.tobytes() for row in pair_of[np.ix_(moving, solids)] >= 0)  # bodies per set of solids
-    best_set = max(counts, key=lambda row: (counts[row] * sum(row), row), default=bytes(len(solids)))
-    solids = solids[np.frombuffer(best_set, dtype=bool)]
-    rows = pair_of[np.ix_(moving, solids)]
-    is_joined = (rows >= 0).all(axis=1) & (margins[rows] == margins[rows[:, :1]]).all(axis=1)
-    if len(solids) < 2 or not is_joined.any():
-        return solids[:0], np.zeros((0, 1), dtype=np.int64)
-    return solids, rows[is_joined]

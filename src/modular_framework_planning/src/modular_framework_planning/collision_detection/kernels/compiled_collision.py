@@ -21,10 +21,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     surface_to_solid,
     surface_to_surface,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import (
-    DistanceField,
-    surface_to_field,
-)
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, encloses
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
@@ -34,15 +30,11 @@ TABLE_CELLS = 128  # table cells along each joint, over one revolution
 # found touching
 CHECK_COUNTS = 5
 REQUESTED, FOUND_FREE, FOUND_TOUCHING, EVALUATED_STATES, EXACTLY_TOUCHING = range(CHECK_COUNTS)
-FIELD = -1  # second body of a pair with all solids of the distance field
 UNKNOWN, APART, NEAR = range(3)  # verdicts of table cells
 
 
 class World(NamedTuple):
     """Bodies of a robot and its environment, and the pairs to check.
-
-    Field pairs come last and have FIELD as their second body. A field pair represents the pairs of its first body with
-    all solids of the distance field.
 
     Attributes:
         tree: Joints of the robot.
@@ -64,12 +56,9 @@ class World(NamedTuple):
             joints; filled on first use, shape (t, TABLE_CELLS, TABLE_CELLS).
         table_joints: Joints of each table, the joint nearer to the base first, -1 for none; shape (t, 2).
         table_of: Table of each pair, -1 for none; shape (p,).
-        watched: Pairs to check; pairs that a field pair represents are left out.
-        represented: Pairs that each field pair represents, in the order of the field's solids; shape (f, n).
         counts: Counters, see CHECK_COUNTS; a check that an exact check repeats is counted once.
-        refusals: Number of checks in which each pair touched; field pairs count for the represented pair; shape (p,).
+        refusals: Number of checks in which each pair touched, shape (p,).
         common_joints: Last joint that moves both bodies of each pair, -1 for none; shape (p,).
-        field: Distance field over solids of the world.
     """
 
     tree: Tree
@@ -89,12 +78,9 @@ class World(NamedTuple):
     tables: NDArray[np.int8]
     table_joints: NDArray[np.int64]
     table_of: NDArray[np.int64]
-    watched: NDArray[np.int64]
-    represented: NDArray[np.int64]
     counts: NDArray[np.int64]
     refusals: NDArray[np.int64]
     common_joints: NDArray[np.int64]
-    field: DistanceField
 
 
 @njit(cache=True, nogil=True)
@@ -161,13 +147,10 @@ def pair_bound(
         memory: Working memory.
 
     Returns:
-        The status and a lower bound [m]. For a touching field pair, the index of a touched solid replaces the bound.
+        The status and a lower bound [m].
     """
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin, excess = world.margins[pair], world.excess[pair]
-    if second == FIELD:
-        surface = world.scene if world.is_environment[first] else world.robot
-        return surface_to_field(surface, world.roots[first], poses[first], world.field, margin, excess, limit, memory)
     if centre_distance(centres, first, second) - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
     relative = memory.relative
@@ -223,8 +206,7 @@ def surrounded_pair(world: World, poses: Array, centres: Array) -> int:
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
         if (
-            second != FIELD
-            and np.isfinite(excess[pair])
+            np.isfinite(excess[pair])
             and centre_distance(centres, first, second) < spheres[first, 3] + spheres[second, 3]
             and (_contains(world, first, second, poses) or _contains(world, second, first, poses))
         ):
@@ -234,7 +216,7 @@ def surrounded_pair(world: World, poses: Array, centres: Array) -> int:
 
 def arguments(world: World) -> tuple[NDArray[Any], ...]:
     """Returns the arrays of a world as separate arguments, which numba dispatches in 4 us instead of 70 us."""
-    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-1], *world.field)
+    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:])
 
 
 @njit(cache=True, nogil=True)
@@ -244,8 +226,8 @@ def world_of(arrays: tuple[NDArray[Any], ...]) -> World:
     # numba supports only one starred argument per call
     tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
     bodies = (tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene)
-    pairs = (a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28], a[29], a[30])
-    return World(*bodies, *pairs, DistanceField(*a[31:]))
+    pairs = (a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28])
+    return World(*bodies, *pairs)
 
 
 @njit(cache=True, nogil=True)

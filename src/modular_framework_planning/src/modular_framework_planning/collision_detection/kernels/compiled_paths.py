@@ -18,7 +18,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_arrays impo
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
     EVALUATED_STATES,
-    FIELD,
     FOUND_FREE,
     FOUND_TOUCHING,
     REQUESTED,
@@ -41,7 +40,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     placed_solid_distance,
     solid_of,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import field_distance
 from modular_framework_planning.collision_detection.kernels.compiled_tables import fill_cells, table_verdict
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
@@ -187,7 +185,7 @@ class Workspace(NamedTuple):
     Attributes:
         section: State and motion bounds of the current section.
         memory: Working memory of a pair check.
-        order: Watched pairs, the most recently touching pair first.
+        order: Pairs, the most recently touching pair first.
     """
 
     section: Section
@@ -199,7 +197,7 @@ class Workspace(NamedTuple):
 def new_workspace(world: World) -> Workspace:
     """Returns working memory for path checks in a world."""
     joints, bodies = len(world.tree.parents), len(world.joints)
-    return Workspace(_new_section(joints, bodies), new_memory(), world.watched.copy())
+    return Workspace(_new_section(joints, bodies), new_memory(), np.arange(len(world.pairs)))
 
 
 @njit(cache=True, nogil=True)
@@ -439,11 +437,11 @@ def check_samples(
     section, memory, order = workspace
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
-    parents, prismatic, body_joints, field = world.tree.parents, world.tree.prismatic, world.joints, world.field
-    counts, refusals, represented = world.counts, world.refusals, world.represented
+    parents, prismatic, body_joints = world.tree.parents, world.tree.prismatic, world.joints
+    counts, refusals = world.counts, world.refusals
     _, poses, centres, axes, sample_ranges, joint_ranges, joint_motions, signs, body_motions, rows = section
     queue = np.empty((64, 4), np.int64)  # first and last sample, begin and end of their pairs in `queued_pairs`
-    queued_pairs, used, last = np.empty(4 * len(pairs) + 16, np.int64), len(world.watched), samples.vertex_samples[-1]
+    queued_pairs, used, last = np.empty(4 * len(pairs) + 16, np.int64), len(pairs), samples.vertex_samples[-1]
     queued_pairs[:used] = order
     queue[0], queue[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, evaluated, undecided_count = 0, 2, 0, 0
@@ -469,32 +467,26 @@ def check_samples(
                     continue
             body, other, needed = pairs[pair, 0], pairs[pair, 1], 2.0 * ROUNDING
             x, y, z = centres[body, 0], centres[body, 1], centres[body, 2]
-            if other == FIELD:
-                needed += body_motions[body] if certifies else 0.0
-                apart = needed + spheres[body, 3] + margins[pair]
-                if field_distance(field, x, y, z, apart) >= apart:
+            base = world.common_joints[pair]
+            if certifies and base < 0:
+                needed += body_motions[body] + body_motions[other]
+            elif certifies:
+                for moving_body in (body, other):
+                    joint = body_joints[moving_body]
+                    needed += _max_motion(
+                        parents, prismatic, axes, joint_motions, signs, centres, spheres, moving_body, joint, base
+                    )
+            gap = centre_distance(centres, body, other) - spheres[body, 3] - spheres[other, 3] - margins[pair]
+            if gap >= needed:
+                continue
+            if kinds[other] != SURFACE:
+                distance = placed_solid_distance(solid_of(kinds, sizes, other), poses, other, x, y, z)
+                if distance - spheres[body, 3] - margins[pair] >= needed:
                     continue
-            else:
-                base = world.common_joints[pair]
-                if certifies and base < 0:
-                    needed += body_motions[body] + body_motions[other]
-                elif certifies:
-                    for moving_body in (body, other):
-                        joint = body_joints[moving_body]
-                        needed += _max_motion(
-                            parents, prismatic, axes, joint_motions, signs, centres, spheres, moving_body, joint, base
-                        )
-                gap = centre_distance(centres, body, other) - spheres[body, 3] - spheres[other, 3] - margins[pair]
-                if gap >= needed:
-                    continue
-                if kinds[other] != SURFACE:
-                    distance = placed_solid_distance(solid_of(kinds, sizes, other), poses, other, x, y, z)
-                    if distance - spheres[body, 3] - margins[pair] >= needed:
-                        continue
             status, bound = pair_bound(world, pair, poses, centres, needed, memory)
             if status == TOUCHING:
                 counts[EVALUATED_STATES] += evaluated
-                refusals[represented[pair - len(pairs) + len(represented), int(bound)] if other == FIELD else pair] += 1
+                refusals[pair] += 1
                 _move_to_front(order, pair)
                 return TOUCHING, middle
             if status == TOO_CLOSE:

@@ -14,7 +14,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
-    FIELD,
     World,
     pair_bound,
     place_bodies,
@@ -123,8 +122,6 @@ def penetrations(world: World, bounding: BoundingSpheres, states: Array) -> Arra
         place_bodies(world, placements, poses, centres)
         spheres_are_placed = False
         for pair in range(len(world.pairs)):
-            if world.pairs[pair, 1] == FIELD:
-                break  # field pairs come last and repeat pairs that are already checked
             status, _ = pair_bound(world, pair, poses, centres, CONTACT_DISTANCE_M, memory)
             if status == CLEAR:
                 continue

@@ -7,7 +7,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD
 from modular_framework_planning.geometry.spatial import Array
 
 
@@ -63,15 +62,14 @@ def _common_joint(parents: NDArray[np.int64], first: int, second: int) -> int:
 
 @njit(cache=True, nogil=True)
 def common_joints(pairs: NDArray[np.int64], joints: NDArray[np.int64], parents: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the last joint that moves both bodies of each pair, -1 for none and for field pairs; shape (p,).
+    """Returns the last joint that moves both bodies of each pair, -1 for none; shape (p,).
 
     Args:
-        pairs: Body indices, shape (p, 2); the second index is FIELD for a field pair.
+        pairs: Body indices, shape (p, 2).
         joints: Joint that moves each body, -1 for the world; shape (b,).
         parents: Index of each joint's parent, -1 for none; shape (n,).
     """
     result = np.full(len(pairs), -1)
     for pair in range(len(pairs)):
-        if pairs[pair, 1] != FIELD:
-            result[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
+        result[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
     return result

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import DistanceField
 from modular_framework_planning.collision_detection.kernels.compiled_edges import (
     BLOCKED,
     FREE,
@@ -87,15 +86,6 @@ def _trees(start: Array, goals: Array, extension_limit: int) -> Trees:
     )
 
 
-def empty_field(field: DistanceField) -> DistanceField:
-    """Returns a distance field of the same solids with all cells unfilled."""
-    return field._replace(
-        is_filled=np.zeros_like(field.is_filled),
-        nearest=np.empty_like(field.nearest),
-        distances=np.empty_like(field.distances),
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TreeGrowth:
     """Rules by which a search grows its trees.
@@ -132,7 +122,7 @@ class RrtConnect:
             problem: Problem that `can_search` accepts.
             goals: Goal joint vectors, shape (n, joints) [rad or m].
             growth: Rules by which the trees grow.
-            search_index: Index among parallel searches. Searches above 0 fill their own distance field and counts.
+            search_index: Index among parallel searches. Searches above 0 fill their own counts.
             length_bound: Upper bound of the weighted path length [rad or m].
         """
         self._problem, self._goals = problem, goals
@@ -140,11 +130,7 @@ class RrtConnect:
         world = problem.compiled_world
         assert world is not None
         if search_index > 0:
-            world = world._replace(
-                field=empty_field(world.field),
-                counts=np.zeros_like(world.counts),
-                refusals=np.zeros_like(world.refusals),
-            )
+            world = world._replace(counts=np.zeros_like(world.counts), refusals=np.zeros_like(world.refusals))
         self._bodies, self._world = world, arguments(world)
         ends = np.vstack([start, goals])
         self._low, self._high = problem.search_bounds(ends)
