@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -48,7 +49,7 @@ def in_region(model: RobotModel, solid: Solid, pose: pin.SE3) -> KinematicConstr
 
 @settings(max_examples=200, deadline=None)
 @given(seed=SEEDS)
-def test_compiled_verdicts_are_those_of_the_single_constraints(model: RobotModel, seed: int) -> None:
+def test_verdicts_on_a_set_are_those_of_the_single_constraints(model: RobotModel, seed: int) -> None:
     rng = np.random.default_rng(seed)
     positions, indices = random_state(model, rng), model.group(GROUP).indices
     tip = model.link_transforms(positions)[TIP]
@@ -112,6 +113,7 @@ def test_a_way_keeps_the_constraint_between_its_states_and_arrives_exactly(
         on_link(model), WORLD, np.diag([1.0, -1.0, -1.0]), np.array([tolerance, tolerance, 7.0]), kind
     )
     constraints = KinematicConstraints(model, orientations=[tilt])
+    loose = KinematicConstraints(model, orientations=[replace(tilt, tolerances=tilt.tolerances + 1.0e-5)])
     arrived = 0
     for _ in range(20):
         start = constraints.sample(rng, model.default_positions(), indices)
@@ -129,15 +131,8 @@ def test_a_way_keeps_the_constraint_between_its_states_and_arrives_exactly(
             for share in np.linspace(0.0, 1.0, 7):
                 state = start.copy()
                 state[indices] = first + share * (second - first)
-                angles = np.abs(constraints.orientations[0].deviation(placed(model, state))[0])
-                assert (angles <= tilt.tolerances + 1.0e-5).all()
+                assert loose.are_satisfied(state)
     assert arrived >= 12
-
-
-def placed(model: RobotModel, positions: np.ndarray) -> pin.Data:
-    data = model.pin_model.createData()
-    pin.forwardKinematics(model.pin_model, data, positions)
-    return data
 
 
 def test_a_path_is_cut_along_the_constraint_and_keeps_its_ends() -> None:
@@ -159,7 +154,14 @@ def test_a_path_is_cut_along_the_constraint_and_keeps_its_ends() -> None:
     )
 
 
-CASES = {
+def distance_outside(solid: BoxSolid | SphereSolid, point: np.ndarray) -> float:
+    """Distance of a point from a solid."""
+    if isinstance(solid, SphereSolid):
+        return max(float(np.linalg.norm(point)) - solid.radius, 0.0)
+    return float(np.linalg.norm(np.maximum(np.abs(point) - 0.5 * np.array([solid.x, solid.y, solid.z]), 0.0)))
+
+
+CASES: dict[str, tuple[BoxSolid | SphereSolid, float]] = {
     "plane": (BoxSolid(2.0, 2.0, 0.004), 0.002),
     "line": (BoxSolid(0.004, 2.0, 0.004), 0.002),
     "ball": (SphereSolid(0.35), 0.35),
@@ -189,7 +191,7 @@ def test_the_tip_stays_in_its_region_at_every_millisecond(model: RobotModel, cas
         state = answer.start.copy()
         state[group.indices] = values
         point = model.link_transforms(state)[TIP].translation - tip.translation
-        assert np.linalg.norm(solid.nearest(point) - point) < 1.0e-5
+        assert distance_outside(solid, point) < 1.0e-5
 
 
 def test_failures_name_the_violated_constraint_and_the_amount(model: RobotModel) -> None:

@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from modular_framework_planning.constraints.compiled_constraints import pose_deviations
+from modular_framework_planning.constraints.constraint_arrays import full_joint_mapping
 from modular_framework_planning.constraints.constraint_kinds import (
     FrameOnRobot,
     JointConstraint,
     OrientationConstraint,
     Parameterization,
     PositionConstraint,
-    euler_xyz,
 )
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import GeometryError
@@ -51,21 +52,6 @@ def inside(kind: str, point: np.ndarray) -> bool:
         "cone": abs(z) <= 0.3 and np.hypot(x, y) <= 0.3 * (0.3 - z) / 0.6,
         "mesh": abs(x) <= 0.1 and abs(y) <= 0.2 and abs(z) <= 0.3,
     }[kind]
-
-
-@pytest.mark.parametrize("kind", SOLIDS)
-@settings(max_examples=100, deadline=None)
-@given(seed=SEEDS)
-def test_the_nearest_point_is_in_the_solid_and_no_sampled_point_is_nearer(kind: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    solid, point = SOLIDS[kind], rng.uniform(-0.6, 0.6, 3)
-    nearest = solid.nearest(point)
-    assert (np.linalg.norm(nearest - point) < 1e-12) == inside(kind, point)
-    assert inside(kind, nearest * (1.0 - 1e-9))
-    for _ in range(20):
-        other = solid.sample(rng)
-        assert inside(kind, other * (1.0 - 1e-9))
-        assert np.linalg.norm(other - point) >= np.linalg.norm(nearest - point) - 1e-9
 
 
 @pytest.mark.parametrize("kind", SOLIDS)
@@ -123,10 +109,35 @@ def test_orientation_verdicts_agree_with_another_librarys_angles(model: RobotMod
         assert result.distance == pytest.approx(2.0 * np.abs(angles).sum(), abs=1e-6)
 
 
-def test_where_roll_and_yaw_turn_about_one_axis_either_tolerance_may_take_the_turn() -> None:
-    turned = (Rotation.from_euler("XYZ", [0.4, np.pi / 2, 0.2])).as_matrix()
-    angles, regular = euler_xyz(turned)
-    assert not regular and angles == pytest.approx([0.6, np.pi / 2, 0.0], abs=1e-6)
+def test_where_roll_and_yaw_turn_about_one_axis_either_tolerance_may_take_the_turn(model: RobotModel) -> None:
+    positions = model.default_positions()
+    turned = Rotation.from_euler("XYZ", [0.4, np.pi / 2, 0.2])
+    target = Rotation.from_matrix(model.link_transforms(positions)[TIP].rotation) * turned.inv()
+    for tolerances, expected in (((0.7, 2.0, 0.1), True), ((0.1, 2.0, 0.7), True), ((0.5, 2.0, 0.5), False)):
+        constraint = OrientationConstraint(on_link(model), WORLD, target.as_matrix(), np.array(tolerances))
+        (result,) = KinematicConstraints(model, orientations=[constraint]).evaluate(positions)
+        assert result.satisfied == expected
+        assert result.distance == pytest.approx(0.6 + np.pi / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+@settings(max_examples=100, deadline=None)
+@given(seed=SEEDS)
+def test_no_point_of_a_region_is_nearer_than_the_distance_from_the_region(
+    model: RobotModel, kind: str, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    solid, point, positions = SOLIDS[kind], rng.uniform(-0.6, 0.6, 3), model.default_positions()
+    region = ((solid, model.link_transforms(positions)[TIP]),)
+    constraints = KinematicConstraints(model, positions=[PositionConstraint(on_link(model), point, WORLD, region)])
+    arrays, columns = constraints.arrays
+    excesses, deviations = pose_deviations(arrays, full_joint_mapping(columns), positions)
+    assert deviations[0] == pytest.approx(point, abs=1e-9)
+    assert (excesses[0] < 1e-9) == inside(kind, point)
+    for _ in range(20):
+        other = solid.sample(rng)
+        assert inside(kind, other * (1.0 - 1e-9))
+        assert np.linalg.norm(other - point) >= excesses[0] - 1e-9
 
 
 @settings(max_examples=60, deadline=None)
@@ -151,8 +162,8 @@ def test_a_position_is_kept_in_any_of_the_regions_of_a_turned_frame(model: Robot
 
 def test_a_joint_without_ends_is_compared_the_short_way_round() -> None:
     positions = np.array([3.1])
-    assert JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=True).evaluate(None, positions).satisfied
-    assert not JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=False).evaluate(None, positions).satisfied
+    assert JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=True).evaluate(positions).satisfied
+    assert not JointConstraint("turn", 0, -3.1, 0.2, 0.2, is_continuous=False).evaluate(positions).satisfied
 
 
 def upright(model: RobotModel, kind: Parameterization, frame: FrameOnRobot) -> OrientationConstraint:

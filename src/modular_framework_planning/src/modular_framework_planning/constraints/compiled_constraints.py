@@ -282,6 +282,28 @@ def first_violated(constraints: ConstraintArrays, mapping: JointMapping, states:
 
 
 @njit(cache=True, nogil=True)
+def pose_deviations(constraints: ConstraintArrays, mapping: JointMapping, state: Array) -> tuple[Array, Array]:
+    """Evaluates the pose constraints at a state.
+
+    Args:
+        constraints: Constraints as arrays.
+        mapping: Mapping of the state to the joints of the constraints.
+        state: State, shape (joints,) [rad or m].
+
+    Returns:
+        The violation of each constraint, shape (m,), and its three angles or the point in the frame of the nearest
+        region, shape (m, 3).
+    """
+    count, workspace = len(constraints.kinds), _new_workspace(constraints)
+    excesses, deviations = np.empty(count), np.empty((count, 3))
+    _place_joints(constraints, mapping, state, workspace)
+    for constraint in range(count):
+        excesses[constraint] = _pose_excess(constraints, constraint, workspace)[0]
+        deviations[constraint] = workspace.deviation
+    return excesses, deviations
+
+
+@njit(cache=True, nogil=True)
 def _edge_satisfied(
     constraints: ConstraintArrays,
     mapping: JointMapping,

@@ -81,6 +81,7 @@ def warm_up(model: RobotModel) -> None:
     )
     indices = np.array([0])
     constraints.are_satisfied(positions)
+    constraints.evaluate(positions)
     constraints.edges_satisfied(np.array([positions, positions]), 1.0)
     constraints.project(positions, indices)
     ConstrainedMotion(constraints, indices, positions, 1.0, 1.0).connect(np.zeros(1), np.ones(1))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 from enum import Enum
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -53,7 +52,7 @@ class FrameOnRobot:
     joint: int
     placement: Transform
 
-    def pose(self, data: Any) -> Transform:
+    def pose(self, data: pin.Data) -> Transform:
         """Returns the pose in the planning frame for the joint placements in `data`."""
         return data.oMi[self.joint] * self.placement if self.joint else self.placement
 
@@ -85,7 +84,7 @@ class JointConstraint:
         value = float(positions[self.index]) - self.target
         return float(np.arctan2(np.sin(value), np.cos(value))) if self.is_continuous else value
 
-    def evaluate(self, _: Any, positions: Array) -> ConstraintResult:
+    def evaluate(self, positions: Array) -> ConstraintResult:
         """Returns the evaluation of a state."""
         value = self.deviation(positions)
         is_satisfied = -self.below - TOLERANCE <= value <= self.above + TOLERANCE
@@ -114,20 +113,8 @@ class PositionConstraint:
     regions: tuple[tuple[Solid, Transform], ...]
     weight: float = 1.0
 
-    def _region_distance(self, data: Any) -> tuple[float, Array]:
-        """Returns the distance to the nearest region, and the point in the frame of this region."""
-        point = self.link.pose(data).act(self.offset)
-        reference = self.reference.pose(data)
-        points = [(reference * pose).actInv(point) for _, pose in self.regions]
-        distances = [
-            float(np.linalg.norm(solid.nearest(at) - at)) for (solid, _), at in zip(self.regions, points, strict=True)
-        ]
-        nearest = int(np.argmin(distances))
-        return distances[nearest], points[nearest]
-
-    def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Returns the evaluation of a state with the joint placements in `data`."""
-        distance, point = self._region_distance(data)
+    def result(self, distance: float, point: Array) -> ConstraintResult:
+        """Returns the result for a distance from the nearest region [m], and the point in the frame of this region."""
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
         return ConstraintResult(
             "position", self.link.name, distance <= TOLERANCE, self.weight * float(np.linalg.norm(point)), text
@@ -155,21 +142,9 @@ class OrientationConstraint:
     parameterization: Parameterization = Parameterization.XYZ_EULER_ANGLES
     weight: float = 1.0
 
-    def deviation(self, data: Any) -> tuple[Array, Array]:
-        """Returns the deviation about the three axes [rad], and the deviation as a rotation matrix."""
-        current = self.reference.pose(data).rotation.T @ self.link.pose(data).rotation
-        deviation_rotation = self.target.T @ current
-        if self.parameterization is Parameterization.ROTATION_VECTOR:
-            return self.target @ pin.log3(deviation_rotation), deviation_rotation
-        angles, regular = euler_xyz(deviation_rotation)
-        if not regular and abs(angles[0]) > self.tolerances[0]:
-            angles = np.array([0.0, angles[1], angles[0]])  # in gimbal lock, roll and yaw are interchangeable
-        return angles, deviation_rotation
-
-    def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Returns the evaluation of a state with the joint placements in `data`."""
-        angles = np.abs(self.deviation(data)[0])
-        excess = float((angles - self.tolerances).max())
+    def result(self, excess: float, angles: Array) -> ConstraintResult:
+        """Returns the result for a violation of the tolerances, and the deviation about the three axes [rad]."""
+        angles = np.abs(angles)
         text = (
             f"link '{self.link.name}' is rotated by {np.array2string(angles, precision=4)} rad about x, y, z; allowed: "
             f"{np.array2string(self.tolerances, precision=4)}"
@@ -194,16 +169,3 @@ class OrientationConstraint:
 
 def _rotation_x(angle: float) -> Array:
     return pin.rpy.rpyToMatrix(angle, 0.0, 0.0)
-
-
-def euler_xyz(rotation: Array) -> tuple[Array, bool]:
-    """Returns the intrinsic XYZ Euler angles of a rotation [rad], and False in gimbal lock."""
-    sine = min(max(float(rotation[0, 2]), -1.0), 1.0)
-    pitch = float(np.arcsin(sine))
-    if abs(sine) > 1.0 - 1.0e-12:
-        return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), pitch, 0.0]), False
-    roll = np.arctan2(-rotation[1, 2], rotation[2, 2])
-    return np.array([roll, pitch, np.arctan2(-rotation[0, 1], rotation[0, 0])]), True
-
-
-Constraint = JointConstraint | PositionConstraint | OrientationConstraint

@@ -15,6 +15,7 @@ from modular_framework_planning.constraints.compiled_constraints import (
     JointMapping,
     edges_satisfied,
     first_violated,
+    pose_deviations,
     project,
 )
 from modular_framework_planning.constraints.constraint_arrays import (
@@ -23,7 +24,6 @@ from modular_framework_planning.constraints.constraint_arrays import (
     joint_mapping,
 )
 from modular_framework_planning.constraints.constraint_kinds import (
-    Constraint,
     ConstraintResult,
     JointConstraint,
     OrientationConstraint,
@@ -54,13 +54,12 @@ class KinematicConstraints:
         self.model = model
         self.name = name
         self.joints, self.positions, self.orientations = tuple(joints), tuple(positions), tuple(orientations)
-        self._all: tuple[Constraint, ...] = (*self.joints, *self.positions, *self.orientations)
         self._data = model.pin_model.createData()
 
     @property
     def is_empty(self) -> bool:
         """Whether the set has no constraint."""
-        return not self._all
+        return not (self.joints or self.positions or self.orientations)
 
     @cached_property
     def arrays(self) -> tuple[ConstraintArrays, NDArray[np.int64]]:
@@ -73,8 +72,14 @@ class KinematicConstraints:
 
     def evaluate(self, positions: Array) -> list[ConstraintResult]:
         """Returns the result of each constraint, in the order joints, positions, orientations."""
-        pin.forwardKinematics(self.model.pin_model, self._data, positions)
-        return [item.evaluate(self._data, positions) for item in self._all]
+        state = np.ascontiguousarray(positions, dtype=float)
+        excesses, deviations = pose_deviations(self.arrays[0], self._full_mapping, state)
+        poses: list[PositionConstraint | OrientationConstraint] = [*self.positions, *self.orientations]
+        results = [
+            item.result(excess, deviation)
+            for item, excess, deviation in zip(poses, excesses.tolist(), deviations, strict=True)
+        ]
+        return [*(item.evaluate(state) for item in self.joints), *results]
 
     def are_satisfied(self, positions: Array) -> bool:
         """Checks that a state satisfies all constraints."""

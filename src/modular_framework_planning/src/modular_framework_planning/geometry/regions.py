@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex solids of position constraint regions: nearest points and random points."""
+"""Convex solids of position constraint regions."""
 
 from __future__ import annotations
 
@@ -18,9 +18,6 @@ class Solid(Protocol):
     @property
     def extent(self) -> float:
         """Maximum distance of a point of the solid from its origin [m]."""
-
-    def nearest(self, point: Array) -> Array:
-        """Returns the point of the solid nearest to `point`, which is `point` itself if inside."""
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a point uniformly distributed in the solid."""
@@ -48,11 +45,6 @@ class BoxSolid:
         """Greatest distance of a point from the origin [m]."""
         return 0.5 * float(np.linalg.norm((self.x, self.y, self.z)))
 
-    def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the box."""
-        half_size = (0.5 * self.x, 0.5 * self.y, 0.5 * self.z)
-        return np.array([min(max(value, -edge), edge) for value, edge in zip(point, half_size, strict=True)])
-
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the box."""
         return rng.uniform(-0.5, 0.5, 3) * (self.x, self.y, self.z)
@@ -72,22 +64,10 @@ class SphereSolid:
         """Greatest distance of a point from the origin [m]."""
         return self.radius
 
-    def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the sphere."""
-        distance = float(np.linalg.norm(point))
-        return point if distance <= self.radius else point * (self.radius / distance)
-
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the sphere."""
         direction = rng.normal(size=3)
         return direction * (self.radius * rng.uniform() ** (1.0 / 3.0) / float(np.linalg.norm(direction)))
-
-
-def _in_slice(point: Array, radius: float, z: float) -> Array:
-    """Returns the point at a radius and height in the half plane through the z axis and `point`."""
-    distance = float(np.hypot(point[0], point[1]))
-    direction = point[:2] / distance if distance > 0.0 else np.array([1.0, 0.0])
-    return np.array([radius * direction[0], radius * direction[1], z])
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +92,6 @@ class CylinderSolid(_RoundSolid):
 
     kind = "cylinder"
 
-    def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the cylinder."""
-        distance = float(np.hypot(point[0], point[1]))
-        half_size = 0.5 * self.height
-        return _in_slice(point, min(distance, self.radius), min(max(float(point[2]), -half_size), half_size))
-
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the cylinder."""
         angle, radius = rng.uniform(-np.pi, np.pi), self.radius * np.sqrt(rng.uniform())
@@ -129,21 +103,6 @@ class ConeSolid(_RoundSolid):
 
     kind = "cone"
 
-    def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the cone, computed in its half section."""
-        section_point = np.array([float(np.hypot(point[0], point[1])), float(point[2])])
-        base, tip = np.array([self.radius, -0.5 * self.height]), np.array([0.0, 0.5 * self.height])
-        side = tip - base
-        if base[1] <= section_point[1] <= tip[1] and section_point[0] * self.height <= self.radius * (
-            tip[1] - section_point[1]
-        ):
-            return point
-        length = float(side @ side)
-        fraction = min(max(float((section_point - base) @ side) / length, 0.0), 1.0) if length > 0.0 else 0.0
-        on_side, on_base = base + fraction * side, np.array([min(section_point[0], self.radius), base[1]])
-        best = min((on_side, on_base), key=lambda item: float(np.linalg.norm(item - section_point)))
-        return _in_slice(point, float(best[0]), float(best[1]))
-
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the cone."""
         from_tip = rng.uniform() ** (1.0 / 3.0)
@@ -152,7 +111,11 @@ class ConeSolid(_RoundSolid):
 
 
 class HullSolid:
-    """The convex hull of a mesh (as in MoveIt, whose mesh regions are hulls)."""
+    """The convex hull of a mesh (as in MoveIt, whose mesh regions are hulls).
+
+    Attributes:
+        faces: Outward unit normals and offsets [m], shape (n, 4); normal . point + offset < 0 for a point inside.
+    """
 
     def __init__(self, vertices: Array) -> None:
         """Computes the hull.
@@ -173,31 +136,16 @@ class HullSolid:
         except (QhullError, ValueError) as error:
             raise GeometryError(f"mesh: its {len(points)} vertices enclose no volume; use a closed mesh") from error
         self._vertices = points[hull.vertices]
-        self._normals, self._offsets = hull.equations[:, :3], hull.equations[:, 3]
+        self.faces = np.asarray(hull.equations)
         self._centroid = self._vertices.mean(axis=0)
         self._face_vertices = points[hull.simplices]
         volumes = np.abs(np.linalg.det(self._face_vertices - self._centroid))
         self._volume_fractions = volumes / volumes.sum()
 
     @property
-    def faces(self) -> Array:
-        """Outward unit normals and offsets [m], shape (n, 4); normal . point + offset < 0 for a point inside."""
-        return np.column_stack([self._normals, self._offsets])
-
-    @property
     def extent(self) -> float:
         """Greatest distance of a point from the origin [m]."""
         return float(np.linalg.norm(self._vertices, axis=1).max())
-
-    def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the hull, computed as a convex combination of vertices."""
-        from scipy.optimize import nnls  # see above
-
-        if float((self._normals @ point + self._offsets).max()) <= 0.0:
-            return point
-        system = np.vstack([(self._vertices - point).T, np.ones(len(self._vertices))])
-        weights, _ = nnls(system, np.array([0.0, 0.0, 0.0, 1.0]))
-        return weights @ self._vertices / float(weights.sum())
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the hull, from a random tetrahedron between its centroid and a face."""

@@ -161,7 +161,7 @@ def _without_passive_joints(
     """Returns the constraints without passive joints; a violated constraint on a passive joint is logged."""
     passive = [item for item in constraints.joints if item.name in scene.model.passive_joints]
     for item in passive:
-        result = item.evaluate(None, scene.positions)
+        result = item.evaluate(scene.positions)
         if not result.satisfied:
             LOGGER.warning("%s: %s; the joint is passive and stays there", field_name, result.text)
     if not passive:
