@@ -59,7 +59,7 @@ def off_line(rows: Array, shift: tuple[float, float, float]) -> float:
 def test_seven_joints_follow_a_line_and_are_timed_within_limits(seven: RobotModel, solver: InverseKinematics) -> None:
     shift = (0.1, 0.1, -0.1)
     line = straight_line(PoseFollower(solver, "flange", BENT), [ahead(shift)], 0.01)
-    assert line.fraction == 1.0 and line.stop == "" and line.waypoint_rows == (len(line.rows) - 1,)
+    assert line.fraction == 1.0 and line.stop == ""
     assert off_line(line.rows, shift) < 1e-6
     assert np.abs(np.diff(line.rows, axis=0)).max() < 0.1
     motion = time_line(solver.group.joints, line.rows, seven.max_velocity, seven.max_acceleration, lambda _: True)
@@ -72,7 +72,7 @@ def test_seven_joints_follow_a_line_and_are_timed_within_limits(seven: RobotMode
 def test_the_fraction_counts_each_line_the_same(solver: InverseKinematics) -> None:
     near, far = ahead((0.0, 0.0, -0.05)), ahead((0.0, 0.0, -3.0))
     line = straight_line(PoseFollower(solver, "flange", BENT), [near, far], 0.01)
-    assert 0.5 < line.fraction < 0.75 and line.waypoint_rows == (5,)
+    assert 0.5 < line.fraction < 0.75
     assert line.stop.startswith("waypoint 1, step ") and line.code == ErrorCode.NO_IK_SOLUTION
     reached = seven_joint_flange(BENT)[2, 3] - seven_joint_flange(line.rows[-1])[2, 3]
     assert reached == pytest.approx(0.05 + (2.0 * line.fraction - 1.0) * 2.95, abs=1e-6)

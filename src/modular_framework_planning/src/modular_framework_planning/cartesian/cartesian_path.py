@@ -52,14 +52,12 @@ class StraightLine:
     Attributes:
         rows: Joint positions of the group, from the start, shape (n, joints) [rad or m].
         fraction: Followed fraction of the lines in [0, 1]; all lines have equal weight.
-        waypoint_rows: Row index of each reached waypoint.
         stop: Reason why the path ends early; empty for a complete path.
         code: Error code of this reason.
     """
 
     rows: Array
     fraction: float
-    waypoint_rows: tuple[int, ...]
     stop: str
     code: ErrorCode
 
@@ -113,7 +111,6 @@ def straight_line(
     """
     _require_usable(waypoints, max_step_m, jumps)
     rows = [follower.rest[follower.group.indices]]
-    reached: list[int] = []
     to_link = pin.SE3.Identity() if carried is None else carried.inverse()
     poses = [follower.pose(rows[0]) * to_link.inverse(), *waypoints]
     lines = [
@@ -126,15 +123,9 @@ def straight_line(
         rows += followed
         if stop:
             fraction = (number + len(followed) / line.count) / len(waypoints)
-            return StraightLine(
-                np.array(rows),
-                fraction,
-                tuple(reached),
-                f"waypoint {number}, step {len(followed) + 1} of {line.count}: {stop}",
-                code,
-            )
-        reached.append(len(rows) - 1)
-    return StraightLine(np.array(rows), 1.0, tuple(reached), "", ErrorCode.SUCCESS)
+            reason = f"waypoint {number}, step {len(followed) + 1} of {line.count}: {stop}"
+            return StraightLine(np.array(rows), fraction, reason, code)
+    return StraightLine(np.array(rows), 1.0, "", ErrorCode.SUCCESS)
 
 
 def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: JumpThresholds) -> None:

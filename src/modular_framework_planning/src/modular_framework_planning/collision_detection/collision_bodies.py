@@ -43,12 +43,11 @@ class PlacedGeometry:
 
 @dataclass(frozen=True, slots=True)
 class WatchedPair:
-    """Indices of two geometries that must keep `margin` [m]; `is_fixed` if no joint changes their relative pose."""
+    """Indices of two geometries that must keep `margin` [m]."""
 
     first: int
     second: int
     margin: float
-    is_fixed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ class WatchedPairs:
 
     def __getitem__(self, index: int) -> WatchedPair:
         first, second = self.parts[index].tolist()
-        return WatchedPair(first, second, float(self.margins[index]), bool(self.fixed[index]))
+        return WatchedPair(first, second, float(self.margins[index]))
 
     def subset(self, indices: NDArray[np.int64]) -> WatchedPairs:
         """Returns the pairs with these indices, cached per index array."""

@@ -17,8 +17,6 @@ import numpy as np
 from pinocchio import SE3 as Transform
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
-from modular_framework_planning.collision_detection.kernels.compiled_collision import arguments
-from modular_framework_planning.collision_detection.kernels.compiled_edges import GroupEdges, check_edges
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import build_sphere_tree
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
@@ -153,9 +151,6 @@ def _check_motions(scene: PlanningScene) -> None:
     checker.collision_costs(np.array([scene.positions]))
     rrt_connect.warm_up(checker, scene.positions)
     assert checker.compiled_world is not None
-    count = len(scene.positions)
-    edges = GroupEdges(np.zeros(count), np.eye(count), MOTION_STEP)
-    check_edges(edges, np.array([[scene.positions, scene.positions + 0.1]]), *arguments(checker.compiled_world))
     path_shortening.warm_up(checker.compiled_world, scene.positions)
 
 

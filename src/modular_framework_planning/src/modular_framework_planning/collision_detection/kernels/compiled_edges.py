@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, world_of
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
@@ -18,8 +17,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
     check_samples,
     count_verdict,
     index_samples,
-    new_workspace,
-    release,
 )
 from modular_framework_planning.geometry.spatial import Array
 
@@ -84,30 +81,3 @@ def check_edge(
     if status != TOO_CLOSE:  # undecided edges are counted by the exact check
         count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
-
-
-@njit(cache=True, nogil=True)
-def check_edges(edges: GroupEdges, motions: Array, *world: NDArray[Any]) -> NDArray[np.int64]:
-    """Returns the result of `check_edge` for each motion.
-
-    Args:
-        edges: Step, and map from the group to the robot.
-        motions: Start and end joint vector of each motion, shape (n, 2, joints) [rad or m].
-        *world: Arrays from `compiled_collision.arguments`.
-    """
-    bodies = world_of(world)
-    workspace, samples = new_workspace(bodies), new_edge(edges)
-    verdicts = np.empty(len(motions), np.int64)
-    _check_all(borrowed(edges), bodies, motions, borrowed(samples), borrowed(workspace), verdicts)
-    release(workspace, samples)
-    return verdicts
-
-
-@njit(cache=True, nogil=True)
-def _check_all(
-    edges: GroupEdges, world: World, motions: Array, samples: Samples, workspace: Workspace, verdicts: NDArray[np.int64]
-) -> None:
-    no_rows = np.empty((0, 2), np.int64)
-    for index in range(len(motions)):
-        start, end = motions[index, 0], motions[index, 1]
-        verdicts[index] = check_edge(edges, world, start, end, samples, no_rows, workspace)
