@@ -7,7 +7,7 @@ import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
-from modular_framework_planning.trajectory_processing.path_shortening import CompiledEdgeTest, shorten
+from modular_framework_planning.trajectory_processing.path_shortening import shorten
 
 
 def shorten_path(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
@@ -19,6 +19,5 @@ def shorten_path(problem: PlanningProblem, path: Array, deadline: float, rng: np
         deadline: Monotonic time at which to stop [s].
         rng: Random generator; None to only remove vertices.
     """
-    fine, world = problem.settings.finest_step, problem.compiled_world
-    compiled = None if world is None else CompiledEdgeTest(problem.motion.edges(fine), world)
-    return shorten(path, lambda first, second: problem.edge_is_valid(first, second, fine), deadline, rng, compiled)
+    fine = problem.settings.finest_step
+    return shorten(path, lambda first, second: problem.edge_is_valid(first, second, fine), deadline, rng)

@@ -34,7 +34,7 @@ from modular_framework_planning.planning_scene.planning_scene import (
     empty_scene,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing import compiled_polylines, path_shortening, time_parameterization
+from modular_framework_planning.trajectory_processing import compiled_polylines, time_parameterization
 
 COLLISIONS = "collisions"
 """Command-line argument of the second process."""
@@ -143,15 +143,13 @@ def _scene(model: RobotModel, voxels: VoxelMap) -> PlanningScene:
 
 
 def _check_motions(scene: PlanningScene) -> None:
-    """Runs every kind of collision check, a search and path shortening in the scene."""
+    """Runs every kind of collision check and a search in the scene."""
     checker = ExactCollisionChecker(scene)
     checker.is_free(scene.positions)
     checker.path_is_free(np.array([scene.positions, scene.positions + 0.1]), MOTION_STEP)
     checker.contacts(scene.positions)
     checker.collision_costs(np.array([scene.positions]))
     rrt_connect.warm_up(checker, scene.positions)
-    assert checker.compiled_world is not None
-    path_shortening.warm_up(checker.compiled_world, scene.positions)
 
 
 def main(arguments: list[str]) -> None:

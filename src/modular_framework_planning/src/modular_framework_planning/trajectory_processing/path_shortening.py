@@ -6,48 +6,20 @@ from __future__ import annotations
 import time
 from bisect import bisect_right
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
-from modular_framework_planning.collision_detection.kernels.compiled_edges import (
-    BLOCKED,
-    FREE,
-    UNKNOWN,
-    GroupEdges,
-)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
-from modular_framework_planning.trajectory_processing.compiled_shortening import (
-    FINISHED,
-    MAX_FAILURES,
-    MIN_SHORTCUT_GAIN,
-    SIZE,
-    UNDECIDED,
-    VERTEX_TOLERANCE,
-    Shortening,
-    apply_verdict,
-    begin,
-    next_edge,
-    shorten_in,
-)
 
 MAX_SHORTCUTS = 60  # attempted shortcuts per path
+MAX_FAILURES = 20  # consecutive failures that end the shortcuts
+MIN_SHORTCUT_GAIN = 0.01  # minimum gain of a shortcut, as a fraction of the path length
+MIN_PULL_GAIN = 0.003  # minimum gain of a pulled vertex, as a fraction of the path length
+MAX_PULL_ROUNDS = 2
+VERTEX_TOLERANCE = 1e-9  # minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex
 EdgeTest = Callable[[Array, Array], bool]
 Join = Callable[[Array, Array, float], Array | None]
-
-
-class CompiledEdgeTest(NamedTuple):
-    """A compiled equivalent of an EdgeTest, which can leave an edge undecided.
-
-    Attributes:
-        edges: Mapping and step of the edge checks.
-        world: World of the compiled checks.
-    """
-
-    edges: GroupEdges
-    world: World
 
 
 def path_length(path: Array) -> float:
@@ -55,56 +27,62 @@ def path_length(path: Array) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def shorten(
-    path: Array,
-    edge_is_free: EdgeTest,
-    deadline: float,
-    rng: np.random.Generator | None,
-    compiled: CompiledEdgeTest | None = None,
-) -> Array:
+def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator | None) -> Array:
     """Returns a path with the same ends that is not longer.
+
+    - Dropping: vertices between two vertices with a free direct edge are removed; long edges are tried first.
+    - Shortcutting: random pairs of points on the path are connected by an edge if the edge is free and shorter.
+    - Pulling: each inner vertex moves halfway towards the line between its neighbours if both new edges are free.
 
     Args:
         path: Polyline, shape (n, joints).
         edge_is_free: Checks an edge.
         deadline: Monotonic time at which to stop [s].
         rng: Random generator; None to only drop vertices.
-        compiled: Compiled edge check, used before `edge_is_free`.
     """
+
+    def is_free(first: Array, second: Array) -> bool:
+        return time.monotonic() <= deadline and edge_is_free(first, second)
+
+    def edge(first: Array, second: Array, max_length: float) -> Array | None:
+        is_shorter = float(np.linalg.norm(second - first)) <= max_length
+        return np.array([first, second]) if is_shorter and is_free(first, second) else None
+
     path = without_repeats(path)
     if len(path) < 3:
         return path
-    random_numbers = np.empty((0, 2)) if rng is None else rng.random((MAX_SHORTCUTS, 2))
-    buffer = np.empty((len(path) + 2 * len(random_numbers), path.shape[1]))
-    buffer[: len(path)] = path
-    shortening = Shortening(buffer, np.empty((2, path.shape[1])), np.zeros(6, np.int64), random_numbers, np.zeros(1))
-    shortening.progress[SIZE] = len(path)
-    begin(shortening)
-
-    def is_free() -> bool:
-        return time.monotonic() <= deadline and edge_is_free(shortening.edge[0].copy(), shortening.edge[1].copy())
-
-    if compiled is not None:
-        _shorten_compiled(shortening, is_free, deadline, compiled)
-    while next_edge(shortening):
-        apply_verdict(shortening, is_free())
-    return buffer[: shortening.progress[SIZE]].copy()
+    path = _without_vertices(path, is_free)
+    if rng is None:
+        return path
+    return _pulled(without_repeats(shortcut_pieces(path, edge, deadline, rng)), is_free)
 
 
-def _shorten_compiled(
-    shortening: Shortening, is_free: Callable[[], bool], deadline: float, compiled: CompiledEdgeTest
-) -> None:
-    """Shortens a path until it is done or the time is over."""
-    world, verdict = arguments(compiled.world), UNKNOWN
-    while time.monotonic() <= deadline:
-        status = shorten_in(shortening, compiled.edges, verdict, *world)
-        if status == FINISHED:
-            return
-        verdict = UNKNOWN
-        if status == UNDECIDED:
-            verdict = FREE if is_free() else BLOCKED
-    if verdict != UNKNOWN:
-        apply_verdict(shortening, verdict == FREE)
+def _without_vertices(path: Array, is_free: EdgeTest) -> Array:
+    """Returns the path without the vertices between two vertices with a free direct edge."""
+    kept, last = [0], len(path) - 1
+    while kept[-1] < last:
+        base = kept[-1]
+        candidates = range(last, base + 1, -1)
+        kept.append(next((vertex for vertex in candidates if is_free(path[base], path[vertex])), base + 1))
+    return path[kept]
+
+
+def _pulled(path: Array, is_free: EdgeTest) -> Array:
+    """Returns the path with inner vertices moved towards the lines between their neighbours."""
+    min_gain = MIN_PULL_GAIN * path_length(path)
+    for _ in range(MAX_PULL_ROUNDS):
+        has_moved = False
+        for index in range(1, len(path) - 1):
+            before, vertex, after = path[index - 1 : index + 2].copy()
+            offset = after - before
+            fraction = min(max(float((vertex - before) @ offset) / (float(offset @ offset) + 1e-30), 0.0), 1.0)
+            pulled = 0.5 * (vertex + before + fraction * offset)
+            gain = path_length(path[index - 1 : index + 2]) - path_length(np.array([before, pulled, after]))
+            if gain >= min_gain and is_free(before, pulled) and is_free(pulled, after):
+                path[index], has_moved = pulled, True
+        if not has_moved:
+            break
+    return path
 
 
 def _lengths(path: Array) -> list[float]:
@@ -129,10 +107,10 @@ def shortcut_pieces(path: Array, join: Join, deadline: float, rng: np.random.Gen
         rng: Random generator.
     """
     failures, lengths = 0, _lengths(path)
-    for _ in range(MAX_SHORTCUTS):
+    for fractions in rng.random((MAX_SHORTCUTS, 2)):
         if len(path) < 3 or failures >= MAX_FAILURES or time.monotonic() > deadline:
             break
-        low, high = sorted(rng.uniform(0.0, lengths[-1], 2).tolist())
+        low, high = sorted((lengths[-1] * fractions).tolist())
         first, start = _point_on_path(path, lengths, low)
         last, end = _point_on_path(path, lengths, high)
         piece = None if first == last else join(start, end, high - low - MIN_SHORTCUT_GAIN * lengths[-1])
@@ -154,14 +132,3 @@ def without_repeats(path: Array, tolerance: float = VERTEX_TOLERANCE) -> Array:
         tolerance: Minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex.
     """
     return path[needed_vertices(np.ascontiguousarray(path), tolerance)]
-
-
-def warm_up(world: World, positions: Array) -> None:
-    """Compiles the loop or loads it from the cache.
-
-    Args:
-        world: World of any scene.
-        positions: Positions of the whole robot [rad or m].
-    """
-    compiled = CompiledEdgeTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), world)
-    shorten(np.array([[0.0], [1.0], [0.0]]), lambda first, second: False, np.inf, np.random.default_rng(), compiled)
