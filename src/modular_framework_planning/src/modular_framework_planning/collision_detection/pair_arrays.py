@@ -21,7 +21,6 @@ from modular_framework_planning.collision_detection.body_arrays import (
 from modular_framework_planning.collision_detection.collision_bodies import PAIR_CACHE_SIZE, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_collision import TABLE_CELLS, UNKNOWN
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
-from modular_framework_planning.collision_detection.kernels.compiled_reaches import common_joints
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.kinematics.compiled_kinematics import Tree
@@ -126,10 +125,22 @@ def _pair_arrays(
         tables=tables,
         table_joints=table_joints,
         table_of=table_of,
-        common_joints=common_joints(both, bodies.joints.astype(np.int64), whole_tree(model).parents),
+        common_joints=_common_joints(whole_tree(model).parents, *bodies.joints[both.T].astype(np.int64)),
         members=PairMembers(kinds, indices),
         uncompiled=tuple(np.flatnonzero(~is_compiled).tolist()),
     )
+
+
+def _common_joints(
+    parents: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Returns the lowest common ancestor of each pair of joints, -1 for none; parents have the smaller indices."""
+    while (first != second).any():
+        first, second = (
+            np.where(first > second, parents[first], first),
+            np.where(second > first, parents[second], second),
+        )
+    return first
 
 
 def _ordered_pairs(bodies: _Bodies, both: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
