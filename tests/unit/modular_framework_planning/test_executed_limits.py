@@ -28,7 +28,6 @@ from modular_framework_planning.kinematics.pose_follower import PoseFollower  # 
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.trajectory_processing.compiled_timing import max_blends  # noqa: E402
 from modular_framework_planning.trajectory_processing.jerk_limits import (  # noqa: E402
-    along_straight_lines,
     averaged_curve,
     slowed_to_limits,
 )
@@ -86,9 +85,6 @@ TIMINGS: dict[str, Timing] = {
     "retimed plan": lambda model, path, limits: retimed(model, timed(path, limits).positions, limits),
     "rounded corners": lambda _, path, limits: rows_of(timed(path, limits)),
     "slow link": lambda model, path, limits: rows_of(with_slow_link(model, path, limits)),
-    "Ruckig": lambda _, path, limits: rows_of(
-        along_straight_lines(tuple("abcdefg"), path, limits.velocity, limits.acceleration, JERK)
-    ),
     "averaged": lambda _, path, limits: rows_of(
         averaged_curve(timed(path, limits), limits.velocity, limits.acceleration, JERK)
     ),

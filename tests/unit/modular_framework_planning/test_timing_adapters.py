@@ -42,7 +42,6 @@ from modular_framework_planning.planning_scene.planning_scene import (
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.jerk_limits import (
-    along_straight_lines,
     averaged_curve,
     slowed_to_limits,
 )
@@ -180,9 +179,7 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
         vertices = np.cumsum(rng.uniform(-1, 1, (rng.integers(2, 6), 6)), axis=0)
         jerk = np.full(6, rng.choice([5.0, 50.0, 500.0]))
         timed = parameterize(tuple("abcdef"), vertices, np.full(len(vertices) - 2, 0.1), velocity, acceleration)
-        straight = along_straight_lines(timed.joint_names, vertices, velocity, acceleration, jerk)
         for motion in (
-            straight,
             averaged_curve(timed, velocity, acceleration, jerk),
             slowed_to_limits(timed, velocity, acceleration, jerk),
         ):
@@ -190,7 +187,6 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
             assert (largest(motion, 3) <= jerk).all()
             assert np.diff(motion.times).min() > 1e-3
             assert np.allclose(motion.positions[[0, -1]], vertices[[0, -1]])
-        assert np.allclose(straight.sample(straight.sample_times())[0][0], vertices[0])
 
 
 def speeds_by_difference(

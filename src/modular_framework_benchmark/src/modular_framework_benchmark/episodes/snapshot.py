@@ -24,7 +24,7 @@ from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import as_json
 from modular_framework_core.launching.launch_session import environment_of
 
-RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
+RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
 """Python packages whose versions affect results."""
 
 ROS_PACKAGES = ("actionlib", "genpy", "robot_state_publisher", "roscpp", "rosgraph", "roslaunch", "rospy", "tf2_ros")

@@ -1,23 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jerk-limited trajectories: Ruckig's along straight lines; slowed or averaged trajectories along curves."""
+"""Jerk-limited trajectories: slowed or averaged."""
 
 from __future__ import annotations
 
 import numpy as np
-import ruckig
 
-from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.time_parameterization import (
     MARGIN,
-    join_trajectories,
     point_times,
     required_slowdown,
 )
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_DEVIATION = 2.0e-3  # maximum deviation of an averaged curve from its path [rad or m]
-MIN_LENGTH = 1.0e-9  # [rad or m]
 
 
 def required_jerk_slowdown(trajectory: Trajectory, velocity: Array, acceleration: Array, jerk: Array) -> float:
@@ -58,65 +54,6 @@ def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Arra
     return trajectory.with_slowdown(
         required_jerk_slowdown(trajectory, velocity * usable, acceleration * usable, jerk * usable)
     )
-
-
-def _straight_line(
-    joint_names: tuple[str, ...], start: Array, end: Array, *, velocity: Array, acceleration: Array, jerk: Array
-) -> Trajectory:
-    """Returns Ruckig's fastest motion from rest to rest along a line."""
-    length = float(np.linalg.norm(end - start))
-    direction = (end - start) / length
-    fraction = np.maximum(np.abs(direction), 1e-12)
-    query = ruckig.InputParameter(1)
-    query.current_position, query.target_position = [0.0], [length]
-    query.max_velocity, query.max_acceleration, query.max_jerk = (
-        [float((limit / fraction).min())] for limit in (velocity, acceleration, jerk)
-    )
-    profile = ruckig.Trajectory(1)
-    result = ruckig.Ruckig(1).calculate(query, profile)
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise PlanningError(
-            ErrorCode.INVALID_MOTION_PLAN,
-            f"Ruckig found no motion over {length} rad within velocity "
-            f"{query.max_velocity}, acceleration {query.max_acceleration} and jerk {query.max_jerk}: "
-            f"{result}",
-        )
-    times = point_times(np.cumsum(profile.profiles[0][0].t)[:-1], float(profile.duration))
-    states = np.array([[item[0] for item in profile.at_time(time)] for time in times.tolist()])
-    return Trajectory(
-        joint_names, times, start + states[:, :1] * direction, states[:, 1:2] * direction, states[:, 2:] * direction
-    )
-
-
-def along_straight_lines(
-    joint_names: tuple[str, ...], vertices: Array, velocity: Array, acceleration: Array, jerk: Array
-) -> Trajectory:
-    """Returns Ruckig's motion along a polyline, with a stop at each vertex.
-
-    Args:
-        joint_names: Joint names, in the order of the columns.
-        vertices: Polyline, shape (n, joints) [rad or m].
-        velocity: Velocity limits, shape (joints,) [rad/s or m/s].
-        acceleration: Acceleration limits, shape (joints,) [rad/s^2 or m/s^2].
-        jerk: Jerk limits, shape (joints,) [rad/s^3 or m/s^3].
-
-    Raises:
-        PlanningError: Ruckig found no motion.
-    """
-    distinct = vertices[np.append(True, np.linalg.norm(np.diff(vertices, axis=0), axis=1) > MIN_LENGTH)]
-    if len(distinct) < 2:
-        still = np.zeros_like(distinct)
-        return Trajectory(joint_names, np.zeros(1), distinct, still, still)
-    parts = [
-        slowed_to_limits(
-            _straight_line(joint_names, start, end, velocity=velocity, acceleration=acceleration, jerk=jerk),
-            velocity,
-            acceleration,
-            jerk,
-        )
-        for start, end in zip(distinct[:-1], distinct[1:], strict=True)
-    ]
-    return join_trajectories(parts)
 
 
 def _integrals(trajectory: Trajectory, times: Array) -> Array:
