@@ -267,7 +267,7 @@ def test_fingers_under_way_when_the_cable_is_pulled_stop_when_it_is_back(
     assert gripper.state().reading.position == pytest.approx(there, abs=0.05)
 
 
-@pytest.mark.parametrize(("torque", "farthest"), [(100, 0.12), (400, 0.4)])
+@pytest.mark.parametrize(("torque", "farthest"), [(100, 0.06), (400, 0.2)])
 def test_fingers_under_way_do_not_go_on_to_their_goal_without_the_cable(
     line: DynamixelLine, gripper: EzGripper, torque: int, farthest: float
 ) -> None:
