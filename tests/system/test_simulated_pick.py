@@ -18,7 +18,9 @@ TASK_TIMEOUT_S = 180.0
 LIFTED_M = 0.10
 BUSY_MACHINE = "still waiting for|no transform from"
 """Warnings of nodes that wait long for others at the start."""
-MAX_LINES = 110  # of the log: roslaunch 36, start 16, states 39
+NO_PLAN = r"\w+ failed \([A-Z_]+\)|\bPlan\w*: "
+"""Warnings of grasps that the arm does not reach."""
+MAX_LINES = 82  # of the log: roslaunch 36, start 15, states 23
 
 # Runs as a node of its own beside the launch and prints how high each model was at first and at last, and how many
 # messages said so, the last of them how many seconds after the first.
@@ -70,11 +72,11 @@ def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSessi
     assert launch.log().splitlines()[-1] == "run_framework: the task succeeded"
     assert "REQUIRED process" not in launch.log() and "Traceback" not in launch.log(), launch.log()
     lines = [line for line in launch.log().splitlines() if not re.search(BUSY_MACHINE, line)]
-    is_plain = (robot, method) == ("modular_framework_api", "top_down_grasps")  # others try grasps out of reach, too
-    phrases = "stalled: joint|has no effect|world without effect|build time|ended with code"
-    alarms = [line for line in lines if re.search(r"WARN|ERROR|FATAL" if is_plain else phrases, line)]
+    reaches_all = (robot, method) == ("modular_framework_api", "top_down_grasps")
+    alarms = [line for line in lines if re.search(r"WARN|ERROR|FATAL", line)]
+    alarms = [line for line in alarms if reaches_all or not re.search(NO_PLAN, line)]
     assert not alarms, alarms
-    assert not is_plain or len(lines) <= MAX_LINES, launch.log()
+    assert not reaches_all or len(lines) <= MAX_LINES, launch.log()
     lifted = {name: last - first for name, (first, last) in heights.items()}
     assert ended and max(lifted.values()) > LIFTED_M, f"{lifted}\n{launch.log()}"
     assert sum(height > LIFTED_M for height in lifted.values()) == 1, lifted

@@ -200,7 +200,7 @@ class StateMachine(Container):
         self.check_consistency()
         self._copy_input_keys(parent_ud)
         label = self.get_initial_states()[0]
-        log.info(f"state machine starts in state '{label}' with userdata {sorted(self.userdata.keys())}")
+        log.info(f"state machine starts in state '{label}'")
         self._running = True
         self._preempted_label = None
         try:

@@ -21,8 +21,6 @@ from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.msg import ManagerChange
 from modular_framework_ros.declared_parameters import DeclaredParameters
 
-OVERWRITE_LOG_PERIOD_S = 1.0  # logging takes as long as ten requests; manager_changes reports every change
-
 
 @dataclass(frozen=True, slots=True)
 class MessageKind:
@@ -171,8 +169,7 @@ class MessageServices(ManagerServices):
                 "The %s '%s' is not stored: %s; give one finite position for each joint.", self.kind.noun, name, fault
             )
             return self.kind.add_type._response_class(success=False)
-        if self.store.add(getattr(request, self.kind.message_field), name):
-            rospy.loginfo_throttle(OVERWRITE_LOG_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
+        self.store.add(getattr(request, self.kind.message_field), name)
         return self.kind.add_type._response_class(success=True)
 
     def _get(self, request: Any) -> Any:
@@ -263,9 +260,8 @@ class MessageServices(ManagerServices):
         if faults and not named:
             return 0, faults
         self.store.load(named, clear=True)
-        rospy.loginfo(
-            "Loaded the %s of %s: %s.", self.kind.plural.replace("_", " "), file.path, ", ".join(named) or "none"
-        )
+        if named:
+            rospy.loginfo("Loaded the %s of %s: %s.", self.kind.plural.replace("_", " "), file.path, ", ".join(named))
         return len(named), faults
 
     def _refuse_request(self, reason: str, count: int = 0) -> Any:

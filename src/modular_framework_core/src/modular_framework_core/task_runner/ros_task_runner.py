@@ -106,7 +106,7 @@ class TaskReporter:
         self._text = StateText(name)
 
     def on_state(self, record: StateRecord, active: tuple[str, ...]) -> None:
-        """Publishes the start or end of a state; logs the first start."""
+        """Publishes the start or end of a state; logs the first start. The state machine logs the transitions."""
         with self._lock:
             is_first, self._has_started_state = not self._has_started_state, True
         if is_first:
@@ -128,8 +128,6 @@ class TaskReporter:
                 "reason": record.reason,
             }
         )
-        if ended:
-            rospy.loginfo(f"state {record.path} ended with '{record.outcome}'")
 
     def on_running(self, states: tuple[RunningState, ...]) -> None:
         """Publishes the elapsed times and feedback of the running states."""
