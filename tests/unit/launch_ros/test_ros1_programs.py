@@ -227,6 +227,35 @@ def test_an_interpolation_that_ros_1_lacks_is_named(tmp_path: Path, capsys: pyte
     assert "controller arm: interpolation_method none has no effect" in line
 
 
+@pytest.mark.parametrize(
+    ("parameter", "warning"),
+    [
+        ("allow_nonzero_velocity_at_trajectory_end: true", ""),
+        (
+            "allow_nonzero_velocity_at_trajectory_end: false",
+            "allow_nonzero_velocity_at_trajectory_end False has no effect",
+        ),
+        ("allow_integration_in_goal_trajectories: true", "ROS 1 always has False"),
+        ("cmd_timeout: 0.0", ""),
+        ("cmd_timeout: 2.0", "cmd_timeout 2.0 has no effect"),
+        ("set_last_command_interface_value_as_state_on_activation: true", ""),
+        ("command_joints: []", ""),
+        ("command_joints: [b]", "command_joints ['b'] has no effect"),
+        ("gains: {a: {angle_wraparound: true}}", ""),
+    ],
+)
+def test_a_trajectory_parameter_of_ros_2_is_dropped_and_named_if_ros_1_does_otherwise(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], parameter: str, warning: str
+) -> None:
+    path = tmp_path / "ros2_controllers.yaml"
+    path.write_text(CONTROLLERS.replace("[position],", f"[position], {parameter},"))
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[str(path)]))
+    name = parameter.partition(":")[0] if "angle" not in parameter else "angle_wraparound"
+    assert not [each for each in context.parameters.values() if name in each]
+    warnings = [line for line in capsys.readouterr().out.splitlines() if "has no effect" in line]
+    assert len(warnings) == bool(warning) and all(warning in line and "controller arm" in line for line in warnings)
+
+
 def test_a_velocity_that_no_state_interface_gives_is_not_checked(tmp_path: Path) -> None:
     (tmp_path / "ros2_controllers.yaml").write_text(
         CONTROLLERS.replace("[position],", "[position], state_interfaces: [position],")

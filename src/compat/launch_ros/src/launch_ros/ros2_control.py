@@ -68,13 +68,19 @@ CONVERTED_PARAMETERS = (
     "command_interfaces",
     "state_interfaces",
     "interface_name",
-    "interpolation_method",
     "interpolate_from_desired_state",
     "open_loop_control",
 )
-"""Parameters of ROS 2 controllers that select the type and the constraints in ROS 1, or that describe what ROS 1 always
-does: with `open_loop_control`, now `interpolate_from_desired_state`, motions start at the last commanded positions, and
-the `interpolation_method` is `splines`."""
+"""Parameters of ROS 2 controllers that select the type and the constraints in ROS 1. With `open_loop_control`, now
+`interpolate_from_desired_state`, motions start at the last commanded positions, as always in ROS 1."""
+ROS1_TRAJECTORY_VALUES = {
+    "allow_integration_in_goal_trajectories": False,
+    "allow_nonzero_velocity_at_trajectory_end": True,
+    "cmd_timeout": 0.0,
+    "interpolation_method": "splines",
+    "set_last_command_interface_value_as_state_on_activation": True,
+}
+"""Parameters of ROS 2's trajectory controller that ROS 1 does not have, with the values that describe ROS 1."""
 
 
 def source_of(path: str) -> ParameterSource:
@@ -165,13 +171,18 @@ def controller_parameters(
                 merge(found.setdefault(name, {}), inner)
     types |= {name: type_name for name, type_name in (given_types or {}).items() if name in found}
     for name, parameters in found.items():
-        if name in types and parameters.get("interpolation_method", "splines") != "splines":
-            get_logger().warning(
-                "controller %s: interpolation_method %s has no effect; ROS 1 always interpolates with splines",
-                name,
-                parameters["interpolation_method"],
-            )
+        if types.get(name) == TRAJECTORY_TYPE:
+            _warn_of_other_values(name, parameters)
     return {name: _ros1_parameters(found.get(name, {}), type_name) for name, type_name in types.items()}
+
+
+def _warn_of_other_values(name: str, parameters: Mapping[str, Any]) -> None:
+    """Logs the parameters of a trajectory controller whose values ROS 1 does not have."""
+    for key, value in (ROS1_TRAJECTORY_VALUES | {"command_joints": parameters.get("joints")}).items():
+        if parameters.get(key, value) not in (value, []):
+            get_logger().warning(
+                "controller %s: %s %s has no effect; ROS 1 always has %s", name, key, parameters[key], value
+            )
 
 
 def _is_controller(value: Any) -> bool:
@@ -182,6 +193,8 @@ def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str,
     ros1 = {name: value for name, value in parameters.items() if name not in CONVERTED_PARAMETERS}
     ros1["type"] = ros1_type(type_name, parameters)
     if type_name == TRAJECTORY_TYPE:
+        for name in (*ROS1_TRAJECTORY_VALUES, "command_joints"):
+            ros1.pop(name, None)
         ros1 |= _ros1_trajectory_parameters(parameters)
     if ros1["type"] == "joint_state_controller/JointStateController":
         ros1.setdefault("publish_rate", JOINT_STATE_RATE)
@@ -198,6 +211,8 @@ def _ros1_trajectory_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]
     if "velocity" not in parameters.get("state_interfaces", ("position", "velocity")):
         constraints["stopped_velocity_tolerance"] = 0.0  # an unavailable velocity is not checked
     gains = {joint: dict(values) for joint, values in parameters.get("gains", {}).items()}
+    for values in gains.values():
+        values.pop("angle_wraparound", None)  # ROS 1 takes this from the joint's type
     feed_forward = {
         joint: values.pop("ff_velocity_scale") for joint, values in gains.items() if "ff_velocity_scale" in values
     }
