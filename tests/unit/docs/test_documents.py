@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -111,3 +113,13 @@ def test_the_task_of_the_first_lesson_is_in_order() -> None:
     faults = FaultList()
     builder = TaskBuilder(StateCatalogue([STATES]), TemplateCatalogue([TEMPLATES]), faults)
     assert builder.build(loads(block[1], "first.yaml", faults), "first.yaml").name == "to_stability"
+
+
+def test_the_table_of_launch_arguments_has_every_argument_with_a_documented_name() -> None:
+    launch = ElementTree.parse(ROOT / "src/modular_framework_api/launch/start_framework.launch")
+    arguments = {arg.attrib["name"] for arg in launch.iterfind("arg")}
+    lines = (ROOT / "docs/configuration.md").read_text().splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith("| `simulation` |"))
+    rows = itertools.takewhile(lambda line: line.startswith("|"), lines[start:])
+    documented = {name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert documented == arguments

@@ -268,6 +268,12 @@ def test_a_browser_draws_every_figure_without_a_network_and_runs_no_hostile_scri
     places = drawn.xpath("//*[@data-figure]")
     assert drawn.get("data-drawn") == str(len(places)) != "0"
     assert all(place.xpath(".//*[local-name()='svg']//*[local-name()='path']") for place in places)
+    legends = drawn.xpath("//*[local-name()='g'][@class='legend']")
+    assert legends
+    for legend in legends:  # the toolbar is at the top
+        (height,) = legend.xpath("ancestor::*[local-name()='svg'][1]/@height")
+        _, top = legend.get("transform").removeprefix("translate(").removesuffix(")").split(",")
+        assert float(top) > 0.5 * float(height)
     assert drawn.get("data-hacked") is None
 
 
