@@ -24,6 +24,7 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import GetPlanningScene, GetPositionFK
+from scipy.interpolate import CubicHermiteSpline
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -184,6 +185,19 @@ def test_a_planned_pick_has_all_its_stages_and_moves_nothing(pickup: Any, arm: F
         assert np.allclose(places[:, :2], BLOCK[:2], atol=1e-3), "straight"
         assert np.allclose(places[[0, -1], 2], (low, high) if up else (high, low), atol=1e-4)
     assert not arm.grips and arm.positions["elbow_joint"] == START[2] and not held()
+
+
+def test_the_fingers_keep_their_limits_along_the_cubic_polynomial_of_a_controller(pickup: Any) -> None:
+    limits = rospy.get_param(f"robot_description_planning/joint_limits/{GRIPPER}")
+    result, report = ask(pickup, pick_goal())
+    assert result.error_code.val == OK, report
+    for stage in (1, 3):
+        points = result.trajectory_stages[stage].joint_trajectory.points
+        times_s = [point.time_from_start.to_sec() for point in points]
+        spline = CubicHermiteSpline(times_s, [p.positions[0] for p in points], [p.velocities[0] for p in points])
+        samples = np.linspace(times_s[0], times_s[-1], 1001)
+        assert np.abs(spline(samples, 1)).max() <= 1.01 * limits["max_velocity"]
+        assert np.abs(spline(samples, 2)).max() <= 1.01 * limits["max_acceleration"]
 
 
 def test_a_pick_and_a_place_are_executed(pickup: Any, place: Any, arm: FakeArm) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -226,16 +226,34 @@ class Manipulation:
         message = RobotTrajectory()
         motion = message.joint_trajectory
         motion.header.frame_id, motion.joint_names = model.planning_frame, list(stage.fingers)
-        indices = [model.index[name] for name in stage.fingers]
-        start, end = stage.scene.positions[indices], np.array(list(stage.fingers.values()))
-        if not len(indices):
-            return message
-        duration_s = float((np.abs(end - start) / model.max_velocity[indices]).max()) + FINGER_SETTLE_S
-        motion.points = [
-            JointTrajectoryPoint(positions=start.tolist(), time_from_start=genpy.Duration(0)),
-            JointTrajectoryPoint(positions=end.tolist(), time_from_start=genpy.Duration.from_sec(duration_s)),
-        ]
+        if stage.fingers:
+            motion.points = self._finger_points(stage.fingers, stage.scene.positions)
         return message
+
+    def _finger_points(self, fingers: Mapping[str, float], positions: Any) -> list[JointTrajectoryPoint]:
+        """Returns a motion of the fingers from rest to rest, which controllers interpolate by a cubic polynomial.
+
+        The duration keeps its highest velocity, 1.5 d/T, and acceleration, 6 d/T^2, within the limits.
+
+        Args:
+            fingers: Final positions by joint name [rad or m].
+            positions: Positions of all joints at the start, in the model's order [rad or m].
+        """
+        model = self._context.model
+        indices = [model.index[name] for name in fingers]
+        start, end = positions[indices], np.array(list(fingers.values()))
+        distances, accelerations = np.abs(end - start), model.max_acceleration[indices]
+        durations_s = np.maximum(
+            1.5 * distances / model.max_velocity[indices], np.sqrt(6.0 * distances / accelerations)
+        )
+        return [
+            JointTrajectoryPoint(
+                positions=row.tolist(),
+                velocities=[0.0] * len(indices),
+                time_from_start=genpy.Duration.from_sec(time_s),
+            )
+            for time_s, row in ((0.0, start), (float(durations_s.max()) + FINGER_SETTLE_S, end))
+        ]
 
     def _execute(self, stage: Stage, message: RobotTrajectory, change: SceneChange) -> None:
         """Executes a stage and applies its effect to the monitored scene; raises PlanningError naming the stage."""
@@ -245,16 +263,11 @@ class Manipulation:
                     self._cancelled
                 )
             elif stage.fingers:
-                self._context.execution.execute(self._from_current_positions(message), self._cancelled)
+                # a held object stops the fingers early
+                message.joint_trajectory.points = self._finger_points(stage.fingers, self._context.monitor.positions())
+                self._context.execution.execute(message, self._cancelled)
             if stage.effect is not None:
                 self._context.monitor.apply(stage.effect)
                 self._grasped = True
         except PlanningError as error:
             raise PlanningError(error.code, f"executing '{stage.name}': {error.reason}") from error
-
-    def _from_current_positions(self, message: RobotTrajectory) -> RobotTrajectory:
-        """Starts the finger motion at the measured positions, because a held object stops the fingers early."""
-        positions, index = self._context.monitor.positions(), self._context.model.index
-        motion = message.joint_trajectory
-        motion.points[0].positions = [float(positions[index[name]]) for name in motion.joint_names]
-        return message
