@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.interpolate import BPoly
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -128,6 +129,34 @@ def test_a_blended_motion_has_continuous_velocity_within_the_joints_limits(
     assert (np.abs(np.diff(velocity, axis=0)) <= highest * step * 1.01).all(), "no jump of the velocity"
     assert (np.abs(np.diff(position, axis=0) - 0.5 * (velocity[1:] + velocity[:-1]) * step) <= 1e-5).all()
     assert np.abs(velocity[[0, -1]]).max() < 1e-12
+
+
+def random_steps(rng: np.random.Generator) -> list[Step]:
+    """Two or three motions of all planners, each at most 0.15 m per axis from the previous one."""
+    positions = np.clip(np.cumsum(rng.uniform(-0.15, 0.15, (int(rng.integers(2, 4)), 3)), axis=0), -0.2, 0.2)
+    planners = rng.choice(["LIN", "PTP", "CIRC"], len(positions))
+    radii = [*rng.uniform(0.01, 0.05, len(positions) - 1), 0.0]
+    turns = rng.uniform(-0.3, 0.3, positions.shape)
+    return [(str(a), tuple(b), tuple(c), d) for a, b, c, d in zip(planners, positions, turns, radii, strict=True)]
+
+
+def test_random_sequences_keep_the_joints_limits_along_the_executed_curve_or_are_refused(
+    robot_at_home: Robot, model: RobotModel
+) -> None:
+    indices, joined = model.group(GROUP).indices, 0
+    for seed in range(50):
+        try:
+            items = robot_at_home.planned(random_steps(np.random.default_rng(seed)))
+            motion = robot_at_home.joiner.join(items)[0].trajectory
+        except PlanningError:
+            continue
+        joined += 1
+        rows = np.stack([motion.positions, motion.velocities, motion.accelerations], axis=1)
+        curve = BPoly.from_derivatives(motion.times, rows)
+        samples = np.union1d(np.arange(0.0, motion.duration_s, 0.001), motion.times)
+        assert np.abs(curve(samples, 1) / model.max_velocity[indices]).max() <= 1.01
+        assert np.abs(curve(samples, 2) / model.max_acceleration[indices]).max() <= 1.01
+    assert joined >= 5
 
 
 def test_without_radii_the_motions_follow_each_other_from_rest_to_rest(robot_at_home: Robot) -> None:
