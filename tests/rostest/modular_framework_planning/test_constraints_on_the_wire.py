@@ -349,7 +349,7 @@ def test_an_orientation_that_was_not_filled_in_is_the_identity() -> None:
     assert results[0] == results[1] and np.isfinite(results[0].distance)
 
 
-@pytest.mark.parametrize("length", [2.0, 1e-4])
+@pytest.mark.parametrize("length", [2.0, 15.1, 1e-4])
 def test_orientations_of_any_length_are_normalised(length: float) -> None:
     tilted = Rotation.from_rotvec([0.0, 0.2, 0.0]) * Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
     long = Quaternion(*(length * tilted.as_quat()))
@@ -383,7 +383,17 @@ def test_orientations_of_any_length_are_normalised(length: float) -> None:
     assert lines.error_code.val == OK and lines.fraction == 1.0
     tilt_at_end = pose_at(lines.solution.joint_trajectory.points[-1].positions)[1]
     assert (tilt_at_end.inv() * tilted).magnitude() < 1e-3 < (level.inv() * tilted).magnitude()
+    distances = []
+    for orientation in (long, Quaternion(*tilted.as_quat())):
+        region = in_box(0.2, 0.5, 1.1, (0.1, 0.2, 0.3))
+        region.constraint_region.primitive_poses[0].orientation = orientation
+        goal = Constraints(position_constraints=[region])
+        distances.append(
+            call("check_state_validity", GetStateValidity, state, GROUP, goal).constraint_result[0].distance
+        )
+    assert distances[0] == pytest.approx(distances[1], abs=1e-9)
     item = box("crate", 0.0, 0.0, 0.3, (0.1, 0.1, 0.1))
+    item.subframe_names, item.subframe_poses = ["side"], [Pose(Point(0.05, 0.0, 0.0), long)]
     item.pose.orientation = item.primitive_poses[0].orientation = long
     assert add(item)
     held = box("held", 0.0, 0.0, 0.1, (0.04, 0.04, 0.04))
@@ -391,7 +401,8 @@ def test_orientations_of_any_length_are_normalised(length: float) -> None:
     hold(held)
     scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
     attached = scene.robot_state.attached_collision_objects[0].object
-    for seen in (scene.world.collision_objects[0].pose, attached.pose):
+    crate = scene.world.collision_objects[0]
+    for seen in (crate.pose, crate.subframe_poses[0], attached.pose):
         q = seen.orientation
         assert abs(np.dot([q.x, q.y, q.z, q.w], tilted.as_quat())) == pytest.approx(1.0, abs=1e-9)
 

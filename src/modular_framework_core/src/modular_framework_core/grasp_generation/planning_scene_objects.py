@@ -65,7 +65,7 @@ class CropBox:
 def rotation_matrix(quaternion: Any) -> npt.NDArray[np.float64]:
     """Returns the rotation matrix of a quaternion message; a quaternion of zeros is the identity."""
     values = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
-    return np.eye(3) if values @ values < 1e-12 else Rotation.from_quat(values).as_matrix()
+    return Rotation.from_quat(values).as_matrix() if values.any() else np.eye(3)
 
 
 def _translation(position: Any) -> npt.NDArray[np.float64]:
