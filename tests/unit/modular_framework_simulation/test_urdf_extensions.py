@@ -7,7 +7,9 @@ import math
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.urdf_extensions import misspelt_extensions
 from modular_framework_simulation.models.urdf_model import read_urdf_model
+from modular_framework_simulation.models.xml_nodes import parse_xml
 
 INERTIAL = """<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"""
 BOX = "<geometry><box size='1 1 1'/></geometry>"
@@ -73,3 +75,15 @@ def test_what_has_no_effect_is_named() -> None:
         "'Plaid' is not a known material",
     ):
         assert said in notes
+
+
+def test_misspelt_elements_and_references_are_found_and_foreign_ones_are_not() -> None:
+    links = "<link name='upper_arm'/><link name='lower_arm'/>"
+    right = "<gazebo reference='upper_arm'><selfCollide>1</selfCollide><my_tag/><enable_wind/></gazebo>"
+    foreign = "<gazebo reference='camera'/><gazebo><plugin name='p' filename='x'><selfColide/></plugin></gazebo>"
+    assert misspelt_extensions(parse_xml(f"<robot name='r'>{links}{right}{foreign}</robot>", "t")) == []
+    wrong = "<gazebo reference='uper_arm'><selfColide>1</selfColide></gazebo>"
+    assert misspelt_extensions(parse_xml(f"<robot name='r'>{links}{wrong}</robot>", "t")) == [
+        "t:1: <gazebo>: there is no link or joint 'uper_arm'; did you mean 'upper_arm'?",
+        "t:1: <selfColide>: <gazebo> has no <selfColide>; did you mean 'selfCollide'?",
+    ]

@@ -130,6 +130,8 @@ class SimulationNode:
             own_worlds = Path(rospkg.RosPack().get_path(_PACKAGE))
             file = find_world_file(parameters["~world_file"], (*self._resources.resource_folders, own_worlds))
             spec = read_world(file, self._resources)
+            for line in spec.unknown:
+                rospy.logwarn(line)
             if spec.ignored:
                 rospy.logwarn("elements of the world without effect: %s", ", ".join(spec.ignored))
             step_s = self._settings.time_step_s

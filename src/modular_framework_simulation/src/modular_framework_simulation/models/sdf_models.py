@@ -11,6 +11,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_conversion import CONVERTED_VERSION, convert
+from modular_framework_simulation.models.sdf_elements import unknown_content
 from modular_framework_simulation.models.sdf_frames import SCOPE, FrameTree, InnerModel
 from modular_framework_simulation.models.sdf_inertial import read_inertial
 from modular_framework_simulation.models.sdf_joints import read_joint
@@ -78,10 +79,14 @@ class SdfModels:
 
     Args:
         resources: Folders and packages for included models and meshes.
+
+    Attributes:
+        unknown: Elements and attributes of included documents that SDF does not define.
     """
 
     def __init__(self, resources: Resources) -> None:
         self._resources = resources
+        self.unknown: list[str] = []
         self._documents: dict[Path, XmlNode] = {}
         self._models = 0
 
@@ -216,6 +221,7 @@ class SdfModels:
     def _document(self, path: Path) -> XmlNode:
         if path not in self._documents:
             self._documents[path] = read_xml(path)
+            self.unknown += unknown_content(self._documents[path])
         return self._documents[path]
 
     def _require_shallow(self, node: XmlNode, depth: int) -> None:

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from modular_framework_simulation.models.sdf_elements import is_defined
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
-_SUPPORTED_CHILDREN: dict[str, tuple[str, ...]] = {
+SUPPORTED_CHILDREN: dict[str, tuple[str, ...]] = {
     "model": ("pose", "static", "link", "joint", "frame", "model", "include", "self_collide", "plugin"),
     "include": ("uri", "name", "pose", "static", "placement_frame"),
     "link": (
@@ -22,7 +23,7 @@ _SUPPORTED_CHILDREN: dict[str, tuple[str, ...]] = {
     "friction/bullet": ("friction", "friction2", "rolling_friction"),
     "friction/torsional": ("coefficient",),
     "bounce": ("restitution_coefficient", "threshold"),
-    "contact": ("ode", "collide_without_contact", "collide_bitmask"),
+    "surface/contact": ("ode", "collide_without_contact", "collide_bitmask"),
     "contact/ode": ("kp", "kd", "max_vel", "min_depth"),
     "joint": ("parent", "child", "pose", "axis", "sensor"),
     "axis": ("xyz", "limit", "dynamics", "use_parent_model_frame"),
@@ -60,19 +61,22 @@ class Notes:
             self._lines.setdefault(line, line)
 
     def note_unsupported(self, node: XmlNode) -> None:
-        """Adds a note for each unsupported element below a node; inner models and includes have their own notes."""
-        self._note_unsupported(node, _SUPPORTED_CHILDREN[node.tag], node.tag)
+        """Adds a note for each unsupported element of SDF below a node.
+
+        Inner models and includes have their own notes; `sdf_elements` finds elements that SDF does not define.
+        """
+        self._note_unsupported(node, SUPPORTED_CHILDREN[node.tag], node.tag)
 
     def _note_unsupported(self, node: XmlNode, supported: tuple[str, ...], path: str) -> None:
         for child in node.children:
-            if child.tag in _IRRELEVANT:
+            if child.tag in _IRRELEVANT or not is_defined(child.tag, path):
                 continue
             if child.tag not in supported:
                 self.add(child, "has no effect", f"<{node.tag}>/<{child.tag}>")
                 continue
-            grandchildren = _SUPPORTED_CHILDREN.get(f"{path}/{child.tag}") or _SUPPORTED_CHILDREN.get(child.tag)
+            grandchildren = SUPPORTED_CHILDREN.get(f"{node.tag}/{child.tag}") or SUPPORTED_CHILDREN.get(child.tag)
             if grandchildren is not None and child.tag not in ("model", "include"):
-                self._note_unsupported(child, grandchildren, child.tag)
+                self._note_unsupported(child, grandchildren, f"{path}/{child.tag}")
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -4,8 +4,8 @@
 Supported elements are includes, poses in all frames, models inside models, links with inertia, shapes, materials,
 surfaces and damping, and fixed, revolute, continuous, prismatic and ball joints. The version of each file determines
 the meaning of its elements. Sensors and plugins are returned unchanged. Elements without effect, such as lights and
-settings of other engines, are listed once per model. Elements that would make the world wrong, such as unsupported
-joints, raise errors.
+settings of other engines, are listed once per model; elements that SDF does not define are listed with their line.
+Elements that would make the world wrong, such as unsupported joints, raise errors.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.joint_trees import refuse_loops
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_elements import children_of, unknown_content
 from modular_framework_simulation.models.sdf_frames import FrameTree, pose_of
 from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, converted_version
 from modular_framework_simulation.models.sdf_resources import Resources
@@ -33,6 +34,9 @@ _GRAVITY_IN_PHYSICS_UNTIL = (1, 5)
 
 _UNIQUE_NAMES_FROM = (1, 7)
 """First version with unique model names; in older files, duplicate models get a numbered name, as in Gazebo."""
+
+READ_OR_APPEARANCE = ("gravity", "frame", "state", "physics", "light", "scene", "gui")
+"""Elements of a world that are read, or determine only its appearance."""
 
 _REFUSED_IN_WORLD = {
     "population": "place the models individually",
@@ -54,9 +58,11 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         DescriptionError: The file or an included file has unsupported or invalid content.
     """
     root = read_xml(path)
+    unknown = unknown_content(root)
     version = converted_version(root)
     world = root.require("world")
-    loaded, ignored = _models_of(world, version, resources)
+    reader = SdfModels(resources)
+    loaded, ignored = _models_of(world, version, reader)
     frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
     frames.refuse_circles()
     models = [
@@ -70,14 +76,12 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         tuple(with_saved_state(models, world.find("state"))),
         tuple(ignored),
         _step(world),
+        (*unknown, *reader.unknown),
     )
 
 
-def _models_of(
-    world: XmlNode, version: tuple[int, ...], resources: Resources
-) -> tuple[dict[str, LoadedModel], list[str]]:
-    """Returns the models of a world by name, and the lines of elements without effect."""
-    reader = SdfModels(resources)
+def _models_of(world: XmlNode, version: tuple[int, ...], reader: SdfModels) -> tuple[dict[str, LoadedModel], list[str]]:
+    """Returns the models of a world by name, and the lines of known elements without effect."""
     loaded: dict[str, LoadedModel] = {}
     ignored: list[str] = []
     for child in world.children:
@@ -95,7 +99,7 @@ def _models_of(
                 )
             model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
-        elif child.tag not in ("gravity", "frame", "state", "physics", "light", "scene", "gui"):
+        elif child.tag in children_of("world") and child.tag not in READ_OR_APPEARANCE:
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
     return loaded, ignored
 
@@ -122,12 +126,15 @@ def read_model_text(text: str, source: str, resources: Resources) -> specs.Model
         DescriptionError: The text has unsupported or invalid content.
     """
     root = parse_xml(text, source)
-    loaded = SdfModels(resources).in_document(root)
+    unknown = unknown_content(root)
+    reader = SdfModels(resources)
+    loaded = reader.in_document(root)
     if loaded is None:
         raise DescriptionError(root.location, "contains only a light or an actor, which have no body", "add a <model>")
     refuse_loops(loaded.spec)
     placed = FrameTree(root.find("world") or root, {loaded.spec.name: loaded.placed})
-    return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name))
+    notes = (*unknown, *reader.unknown, *loaded.spec.notes)
+    return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name), notes=notes)
 
 
 def _step(world: XmlNode) -> float | None:

@@ -318,6 +318,7 @@ class World:
         models: Models in file order.
         ignored: Ignored elements, as "file:line: <element>", without elements of the world's appearance.
         step_s: Physics step of the file [s]; None if the file has none.
+        unknown: Elements and attributes of the world and of included models that SDF does not define.
     """
 
     name: str
@@ -325,6 +326,7 @@ class World:
     models: tuple[Model, ...]
     ignored: tuple[str, ...]
     step_s: float | None = None
+    unknown: tuple[str, ...] = ()
 
 
 def collision_object_id(model: str, link: str) -> str:

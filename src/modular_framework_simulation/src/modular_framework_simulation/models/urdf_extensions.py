@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from modular_framework_ros.allowed_names import misspelling
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.materials import Material, gazebo_material
+from modular_framework_simulation.models.sdf_elements import children_of
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_surface import friction_coefficient, non_negative
 from modular_framework_simulation.models.xml_nodes import XmlNode
@@ -17,6 +19,37 @@ _JOINT_TAGS = ("springStiffness", "springReference", "preserveFixedJoint", "disa
 _SENSOR_TAGS = ("sensor", "plugin")
 """Elements that the sensors read."""
 _MODEL_TAGS = ("static", "selfCollide", "self_collide")
+_KNOWN_TAGS = (*_LINK_TAGS, *_JOINT_TAGS, *_SENSOR_TAGS, *_MODEL_TAGS)
+_OTHER_TAGS = (
+    *("cfmDamping", "fdir1", "fudgeFactor", "implicitSpringDamper", "laserRetro", "maxContacts", "provideFeedback"),
+    *("stopCfm", "stopErp", "initialJointPosition"),
+    *(tag for element in ("model", "link", "joint", "collision", "visual") for tag in children_of(element)),
+)
+"""Elements that Gazebo reads or copies into the model, without effect in this simulation."""
+
+
+def misspelt_extensions(robot: XmlNode) -> list[str]:
+    """Returns the misspelt elements and references of the `<gazebo>` elements of a robot.
+
+    Any element may be copied into the model, and a reference to a missing link has no effect, so only names are
+    misspelt that differ from a known name by a letter or two.
+
+    Args:
+        robot: Root element of the description.
+    """
+    owners = [node.attributes.get("name", "") for tag in ("link", "joint") for node in robot.find_all(tag)]
+    faults = []
+    for node in robot.find_all("gazebo"):
+        owner = node.attributes.get("reference", "")
+        meant = next((name for name in owners if owner and owner not in owners and misspelling(owner, name)), "")
+        if meant:
+            faults.append(f"{node.location}: there is no link or joint '{owner}'; did you mean '{meant}'?")
+        for child in node.children:
+            unknown = child.tag not in (*_KNOWN_TAGS, *_OTHER_TAGS)
+            meant = next((tag for tag in _KNOWN_TAGS if unknown and misspelling(child.tag, tag)), "")
+            if meant:
+                faults.append(f"{child.location}: <gazebo> has no <{child.tag}>; did you mean '{meant}'?")
+    return faults
 
 
 class UrdfExtensions:
