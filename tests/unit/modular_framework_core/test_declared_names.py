@@ -62,6 +62,18 @@ def test_parameters_of_hardware_are_checked_by_the_declaration_of_its_class(chan
     assert text in found
 
 
+def test_names_in_lists_are_names_too() -> None:
+    parameters = {"/robot_hw/type": "modular_framework_control/MockRobotHW", "/robot_hw/joints": ["a", "b"]}
+    names = DeclaredNames(LaunchPreview((ROBOT_HW,), parameters))
+    assert list(names.naming("joint")) == [("/robot_hw/joints", "a"), ("/robot_hw/joints", "b")]
+
+
+def test_parameters_that_change_nothing_are_known() -> None:
+    names = DeclaredNames(LaunchPreview((ROBOT_HW, MOVE_GROUP), COMBINED))
+    assert {"/arm_hw/robot_program_path", "/move_group/max_safe_path_cost"} <= {*names.without_effect()}
+    assert "/arm_hw/robot_ip_address" not in names.without_effect()
+
+
 def test_hardware_of_others_without_a_declaration_may_have_any_parameter() -> None:
     assert faults({"/robot_hardware": ["arm"], "/arm/type": "my_arm/MyArm", "/arm/joints": 3}) == []
     assert faults({"/robot_hw/type": "my_arm/MyArm", "/robot_hw/joints": 3, "/robot_hw/real_time_priority": 80}) == []

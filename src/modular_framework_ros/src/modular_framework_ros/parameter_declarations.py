@@ -56,6 +56,8 @@ class Declaration:
         tree: Whether the parameter is a namespace whose keys depend on the robot or a plugin.
         below: PACKAGE/NAME of the declarations in this namespace, with the placeholders `{joint}`, `{link}` and
             `{group}` for names of the robot; empty to allow all keys.
+        effect: Whether the value changes what the node does. Two levels of an experiment that differ only in parameters
+            without effect run the same.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Declaration:
     adjustable: tuple[Any, ...] = ()
     tree: bool = False
     below: str = ""
+    effect: bool = True
 
     @property
     def allowed_values(self) -> str:

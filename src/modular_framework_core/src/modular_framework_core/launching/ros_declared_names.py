@@ -48,21 +48,23 @@ class DeclaredNames:
 
     Attributes:
         known: Nodes and declarations of each declared parameter, by resolved name.
+        undeclared: Nodes without a declaration, which may read any parameter.
     """
 
     def __init__(self, launch: LaunchPreview) -> None:
         self._launch = launch
         self.known: dict[str, list[tuple[LaunchedNode, Declaration]]] = {}
-        self._undeclared_nodes: list[str] = []
+        self.undeclared: list[LaunchedNode] = []
         self._closed_nodes: list[str] = []
         self._open_nodes: list[str] = []
         for node, declared in self._declarations():
             if declared is None:
-                self._undeclared_nodes.append(f"{node.name}/")
+                self.undeclared.append(node)
                 continue
             (self._closed_nodes if declared.closed else self._open_nodes).append(f"{node.name}/")
             for item in declared.parameters.values():
                 self.known.setdefault(_resolved_name(item.name, node), []).append((node, item))
+        self._undeclared_nodes = [f"{node.name}/" for node in self.undeclared]
         self._trees = [f"{name}/" for name, users in self.known.items() if any(item.tree for _, item in users)]
 
     def _declarations(self) -> Iterator[tuple[LaunchedNode, NodeDeclaration | None]]:
@@ -209,13 +211,18 @@ class DeclaredNames:
                 values[name] = float(value) if item.type == "float" and is_whole else value
         return values
 
+    def without_effect(self) -> list[str]:
+        """Returns the resolved names of the parameters that change nothing in any node."""
+        return [name for name, users in self.known.items() if not any(item.effect for _, item in users)]
+
     def naming(self, kind: str) -> Iterator[tuple[str, str]]:
-        """Yields resolved name and value of each parameter whose value is a name of the given kind."""
+        """Yields resolved name and value of each parameter that is a name of the given kind, or a list of names."""
         for name, users in self.known.items():
             if any(item.names == kind for _, item in users):
                 value = self._launch.parameters.get(name, users[0][1].default)
-                if isinstance(value, str) and value:
-                    yield name, value
+                for item in value if isinstance(value, list) else [value]:
+                    if isinstance(item, str) and item:
+                        yield name, item
 
     def _hint(self, name: str) -> str:
         """Returns a hint with the most similar declared parameter, first of the same node, then of all nodes."""
