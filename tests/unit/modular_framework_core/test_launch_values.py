@@ -38,6 +38,10 @@ def start() -> str:
         (["real_time_factor:=fast"], "is 'fast'; allowed: a number, at least 0"),
         (["seed:=abc"], "is 'abc'; allowed: a whole number"),
         (["generated_state_machine_name:=a/b"], "is 'a/b', which must be letters, digits and underscores"),
+        (["viewer_port:=-3"], "is -3; allowed: a whole number, at least 0 and at most 65535"),
+        (["viewer_port:=70000"], "is 70000; allowed: a whole number, at least 0 and at most 65535"),
+        (["viewer_port:=eight"], "is 'eight'; allowed: a whole number"),
+        (["ui_port:=0"], "is 0; allowed: a whole number, at least 1"),
         (["physics_engine:=bulet"], "is 'bulet'; allowed: pybullet, mujoco"),
     ],
 )

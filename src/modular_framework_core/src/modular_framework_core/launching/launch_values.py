@@ -39,6 +39,11 @@ CONFIGURATION_FILES = (
 """Required files of the configuration folder."""
 NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
 """Optional files of the configuration folder."""
+PORTS = {
+    "viewer_port": ("modular_framework_simulation", "viewer"),
+    "ui_port": ("modular_framework_ui", "page"),
+}
+"""Package and name of the node whose parameter `~port` an argument sets. The node may not be part of the launch."""
 SCRIPT, MACHINE = "task_constructor_script", "state_machine_to_load"
 
 
@@ -62,6 +67,7 @@ def file_faults(values: Mapping[str, str]) -> list[str]:
         *_folder_faults(values),
         *_task_faults(values),
         *_generated_name_faults(values),
+        *_port_faults(values),
     ]
     return [*faults, *(_package_faults(values) if "robot_package" in values else ())]
 
@@ -80,6 +86,16 @@ def _number_faults(values: Mapping[str, str]) -> Iterator[str]:
         argument = name.lstrip("~/")
         if (item.type in ("int", "float") or item.choices) and values.get(argument, "") != "":
             fault = item.fault(roslaunch.loader.convert_value(values[argument], "auto"))
+            if fault:
+                yield f"argument '{argument}' {fault}"
+
+
+def _port_faults(values: Mapping[str, str]) -> Iterator[str]:
+    """Yields the faults of port numbers."""
+    for argument, node in PORTS.items():
+        declared = node_declaration(*node)
+        if declared is not None and values.get(argument, "") != "":
+            fault = declared.parameters["~port"].fault(roslaunch.loader.convert_value(values[argument], "auto"))
             if fault:
                 yield f"argument '{argument}' {fault}"
 
