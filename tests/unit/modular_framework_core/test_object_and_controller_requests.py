@@ -41,6 +41,10 @@ def test_the_name_defaults_to_the_type_and_to_the_folder_of_a_lone_file(models: 
     assert parse_request(["-t", "box", "-n", "mine"], str(models)).name == "mine"
 
 
+def test_a_type_is_found_in_any_of_the_folders_of_models(models: Path) -> None:
+    assert parse_request(["-t", "box"], f"{models / 'none'}:{models}").sdf_file == models / "box" / "model.sdf"
+
+
 def test_deleting_needs_no_models(models: Path) -> None:
     request = parse_request(["-d", "True", "-n", "box", "-t", "", "-p", "0", "0", "0", "-r", "world", "-f", ""], "")
     assert request.delete

@@ -71,12 +71,28 @@ def moveit_config_folder(package: str = "") -> Path | None:
 
     Returns None if the package is not found.
     """
+    package = package or _default_argument("moveit_config_package")
+    return _package(package) if package else None
+
+
+def models_folder(package: str = "") -> Path | None:
+    """Returns the folder of the models in a package, by default in the description package of the API's launch file.
+
+    Returns None if the package is not found or has no models.
+    """
+    package = package or _default_argument("description_package")
+    folder = _package(package) if package else None
+    return None if folder is None or not (folder / "models").is_dir() else folder / "models"
+
+
+def _default_argument(name: str) -> str:
+    """Returns the default of an argument of the API package's launch file; "" if there is none."""
     api = _package(API_PACKAGE)
     launch = None if api is None else api / "launch" / LAUNCH_FILE
-    if not package and launch is not None and launch.is_file():
-        args = xml_text.read(launch).findall("arg")
-        package = next((item.get("default", "") for item in args if item.get("name") == "moveit_config_package"), "")
-    return _package(package) if package else None
+    if launch is None or not launch.is_file():
+        return ""
+    args = xml_text.read(launch).findall("arg")
+    return next((item.get("default", "") for item in args if item.get("name") == name), "")
 
 
 def srdf_file(package: str = "") -> Path | None:

@@ -46,7 +46,7 @@ def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
 
     Args:
         arguments: Arguments without the program name; triplets may be separated by spaces or commas.
-        model_path: Folder of the models, required to spawn by type.
+        model_path: Folders of the models, separated by colons; required to spawn by type.
 
     Raises:
         ObjectRequestError: An argument is missing or invalid.
@@ -96,7 +96,7 @@ def request_to_spawn(
         position_m: Position x, y, z in the reference frame [m].
         rpy_rad: Roll, pitch, yaw in the reference frame [rad].
         reference_frame: Reference frame of the pose.
-        model_path: Folder of the models.
+        model_path: Folders of the models, separated by colons.
 
     Raises:
         ObjectRequestError: The model does not exist, or the pose is not three finite numbers each.
@@ -138,7 +138,8 @@ def _model_file(object_type: str, model_path: str) -> Path:
             "parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
             "folder of the models, or give a file (-f)"
         )
-    return Path(model_path) / object_type / MODEL_FILE
+    files = [Path(folder) / object_type / MODEL_FILE for folder in model_path.split(":") if folder]
+    return next((file for file in files if file.is_file()), files[0])
 
 
 def _split_triplets(arguments: Sequence[str]) -> list[str]:

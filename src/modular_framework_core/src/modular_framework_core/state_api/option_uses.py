@@ -28,7 +28,7 @@ class Named:
 
     Attributes:
         kind: Kind of name: joint_state, trajectory, pose, plan, grasp, posture, group, region, model, series
-            (common part of numbered models) or planner;
+            (common part of numbered models), object_type (folder of a model) or planner;
             ``option:<name>`` if another option gives the kind.
         made: Whether the state stores a message under the name.
         userdata: Whether the name ``userdata`` refers to the input key ``selected_<kind>``.

@@ -20,7 +20,8 @@ POSES_FILE = "named_poses.yaml"
 _FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": POSES_FILE}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
-PLANNER, MODEL, SERIES = "planner", "model", "series"
+PLANNER, MODEL, SERIES, OBJECT_TYPE = "planner", "model", "series", "object_type"
+MODEL_FILE = "model.sdf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class KnownNames:
     """Known names by kind.
 
     The kinds are joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, region, model,
-    planner; and series, the common parts of numbered models.
+    object_type (folder of a model), planner; and series, the common parts of numbered models.
 
     Attributes:
         names: Kind -> known names, except for planners. Names of an absent kind are not checked.
@@ -101,6 +102,20 @@ class KnownNames:
         """
         names, origins = {**self.names, MODEL: frozenset(models)}, {**self.origins, MODEL: origin}
         return replace(self, names=names, origins=origins | {SERIES: origin})
+
+    def with_object_types(self, path: str, origin: str) -> KnownNames:
+        """Returns a copy with the types of objects: the folders of models.
+
+        Args:
+            path: Folders with one folder per model, separated by colons, as in the parameter `gazebo_model_path`.
+            origin: Source of the path, for messages.
+        """
+        folders = [Path(folder) for folder in path.split(":") if folder]
+        types = frozenset(
+            str(file.parent.relative_to(folder)) for folder in folders for file in folder.glob(f"**/{MODEL_FILE}")
+        )
+        names, origins = {**self.names, OBJECT_TYPE: types}, {**self.origins, OBJECT_TYPE: origin}
+        return replace(self, names=names, origins=origins)
 
     def with_planners(self, planners: Callable[[], PlannerNames | None]) -> KnownNames:
         """Returns a copy with the function that returns the available planners; the copy calls the function once."""
@@ -155,18 +170,26 @@ def names_of_config(folder: Path) -> KnownNames:
     return KnownNames(names, origins, str(group))
 
 
-def names_of_installation(config: Path | None, moveit_package: str = "") -> KnownNames:
-    """Returns the names of a configuration folder and of the robot in a MoveIt configuration package.
+def names_of_installation(config: Path | None, moveit_package: str = "", description: str = "") -> KnownNames:
+    """Returns the names of a configuration folder, of the robot in a MoveIt configuration package, and of models.
 
     Args:
         config: Configuration folder; None for the API package's folder, if installed.
         moveit_package: MoveIt configuration package; "" for the package in the API package's launch file.
+        description: Package with the models; "" for the package in the API package's launch file.
 
     Raises:
         ValueError: A file cannot be read, or a given folder or package does not exist.
     """
     folder = config or default_folders.config_folder()
     names = KnownNames() if folder is None else names_of_config(folder)
+    models = default_folders.models_folder(description)
+    if models is not None:
+        names = names.with_object_types(str(models), str(models))
+    elif description:
+        raise ValueError(
+            f"package '{description}' is not found, or has no folder models; name the package with the models"
+        )
     srdf = default_folders.srdf_file(moveit_package)
     if srdf is None and moveit_package:
         raise ValueError(

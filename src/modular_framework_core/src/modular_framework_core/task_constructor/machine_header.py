@@ -7,7 +7,7 @@ from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
-from modular_framework_core.task_constructor.known_names import MODEL
+from modular_framework_core.task_constructor.known_names import MODEL, OBJECT_TYPE
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_keys import SHARED_USERDATA, machine_keys, required_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
@@ -15,7 +15,7 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateC
 from modular_framework_ros.allowed_names import listing
 
 DEFAULT_OUTCOMES = ("success", "fail")
-EXTERNAL_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp", MODEL)
+EXTERNAL_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp", MODEL, OBJECT_TYPE)
 
 
 class HeaderReader:

@@ -32,6 +32,7 @@ _NON_MESSAGE_KINDS = {
     SERIES: "series of objects",
     PLANNER: "planner",
 }
+"""Kinds without external names, and their words in messages."""
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
@@ -67,6 +68,16 @@ def names_used(root: MachineSpec, kind: str) -> tuple[str, ...]:
                 value = state.options.get(option.name, option.default)
                 names |= dict.fromkeys(str(name) for name in (value if isinstance(value, list) else [value]) if name)
     return tuple(names)
+
+
+def names_made(root: MachineSpec, kind: str) -> frozenset[str]:
+    """Returns the names of a kind that the states of a task store or spawn."""
+    return _stored_names(list(root.leaf_states())).get(kind, frozenset())
+
+
+def texts_used(root: MachineSpec) -> frozenset[str]:
+    """Returns all texts in the options of a task's states, at any depth."""
+    return frozenset(text for state in root.leaf_states() for node in state.nodes.values() for _, text in _texts(node))
 
 
 class _Checker:

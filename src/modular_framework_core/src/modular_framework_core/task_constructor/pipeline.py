@@ -116,7 +116,7 @@ def main(arguments: Sequence[str], planners_of: Callable[[str], PlannerNames | N
             print(_about_language(args, catalogue, TemplateCatalogue(templates)))
             return 0
         script = default_folders.task_script(args.script)
-        known = names_of_installation(args.config, args.moveit_config)
+        known = names_of_installation(args.config, args.moveit_config, args.description)
         known = known.with_planners(partial(planners_of, args.moveit_config))
         if args.check or args.graph:
             print(_draw_and_describe(args, check_task(script, states, templates, known)))
@@ -165,6 +165,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PACKAGE",
         default="",
         help="MoveIt configuration package of the robot (default: from the API package's launch file)",
+    )
+    parser.add_argument(
+        "--description",
+        metavar="PACKAGE",
+        default="",
+        help="package with the models of the task's objects (default: from the API package's launch file)",
     )
     parser.add_argument("--explain", metavar="NAME", help="describe a state or template and its options")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")

@@ -96,7 +96,7 @@ class TaskBuilder:
                 userdata_checks.check_userdata(root, self._provided_by(), self._faults)
         self._faults.raise_if_any()
         assert root is not None, "a machine that cannot be built adds a fault"
-        return TaskSpec(name, node_name, script, root)
+        return TaskSpec(name, node_name, script, root, external)
 
     # ---- machines ------------------------------------------------------------------------------------------
     def _machine(self, label: str, header: Mapping, scope: ParamsScope, parent: str | None) -> MachineSpec | None:

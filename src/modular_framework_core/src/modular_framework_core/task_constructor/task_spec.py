@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Union
 
@@ -113,9 +113,11 @@ class TaskSpec:
         node_name: Name of the ROS node if the generated file is run directly.
         script: Path of the YAML file.
         root: Outermost machine.
+        external_names: Names that other nodes add, by kind.
     """
 
     name: str
     node_name: str
     script: str
     root: MachineSpec
+    external_names: Mapping[str, frozenset[str]] = field(default_factory=dict)

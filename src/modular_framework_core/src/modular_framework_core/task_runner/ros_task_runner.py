@@ -62,6 +62,7 @@ from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 
+MODEL_PATH = "/gazebo_model_path"
 STOP_GRACE_S = 0.6
 """Time for running states to stop before the node exits without them [s]."""
 
@@ -386,6 +387,8 @@ def _known_names() -> KnownNames:
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
     names = names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
+    folders = str(rospy.get_param(MODEL_PATH, "") or "")
+    names = names.with_object_types(folders, f"the parameter {MODEL_PATH}, {folders}") if folders else names
     return names.with_planners(_planners)
 
 

@@ -29,7 +29,8 @@ class SpawnObject(FrameworkState):
 
     def __init__(
         self,
-        object_type: Annotated[str, Named("model", made=True)],  # also the name of an object without a name
+        # also the name of an object without a name
+        object_type: Annotated[str, Named("object_type"), Named("model", made=True)],
         object_name: Annotated[str, Named("model", made=True)] = "",
         position: Vector = (0.0, 0.0, 0.0),
         orientation: Vector = (0.0, 0.0, 0.0),
