@@ -78,6 +78,12 @@ def test_a_launch_file_has_a_package_or_is_a_path_and_the_task_is_an_argument(tm
         resolve_launch(TaskSettings(launch="nothing"))
 
 
+def test_an_episode_keeps_the_regions_of_the_launch_argument() -> None:
+    goal = {"x": [0.1, 0.2], "y": [0.4, 0.5]}
+    assert resolve_launch(TaskSettings(arguments={"regions": str({"goal": goal})})).regions == {"goal": goal}
+    assert resolve_launch(TaskSettings()).regions == {}
+
+
 def test_parameters_of_an_episode_replace_those_of_the_launch_file_and_keep_their_types(tmp_path: Path) -> None:
     (tmp_path / "own.launch").write_text(
         "<launch><rosparam>planner_name: A\narm: {speed: 1.0, name: x}</rosparam>"

@@ -92,6 +92,12 @@ def test_the_first_episode_of_a_stack_runs_twice_and_the_second_run_is_recorded(
     assert ["cold_start" in record.snapshot for record in records] == [True, False]
 
 
+def test_an_episode_adds_its_regions_to_those_of_the_launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    goal = {"x": [0.1, 0.2]}
+    _, (stack,) = run_episodes(tmp_path, monkeypatch, succeeded, regions={"goal": goal})
+    assert stack.requests[0]["parameters"]["/regions"] == {"goal": goal}
+
+
 def test_a_first_run_without_an_end_is_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(number: int) -> dict[str, Any]:
         raise TimeoutError

@@ -6,12 +6,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import roslaunch.config
 import roslaunch.core
 import roslaunch.rlutil
 import roslaunch.xmlloader
 import rospkg
+import yaml
 
 from modular_framework_benchmark.episodes.stack import StackLaunch
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
@@ -69,7 +71,17 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         method_nodes,
         controllers,
         can_restart=values.get("wait_for_planning", "").lower() in TRUE_VALUES,
+        regions=_regions_in(values.get("regions", "")),
     )
+
+
+def _regions_in(text: str) -> dict[str, Any]:
+    """Returns the regions in the launch argument `regions`; empty for a text that the check of the launch refuses."""
+    try:
+        regions = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return {}
+    return regions if isinstance(regions, dict) else {}
 
 
 @dataclass(frozen=True, slots=True)

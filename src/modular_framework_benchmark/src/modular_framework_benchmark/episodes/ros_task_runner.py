@@ -19,6 +19,7 @@ from modular_framework_benchmark.episodes.stack import Stack, StackError, StackL
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.recording_files import read_stage
+from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_benchmark.predicates.predicate import Stage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.episode_settings import SettingsError
@@ -110,7 +111,7 @@ class TaskEpisodeRunner:
             "parameters": {
                 "/seed": end.spec.seed,
                 "/task/record_directory": str(end.folder / TASK_RECORDS),
-                "/regions": {region.name: region.as_parameter for region in settings.regions},
+                REGIONS: {**launch.regions, **{region.name: region.as_parameter for region in settings.regions}},
             },
             "begun": end.begun_monotonic,
         }

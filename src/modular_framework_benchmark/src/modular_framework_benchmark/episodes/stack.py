@@ -15,7 +15,7 @@ import threading
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ class StackLaunch:
         method_nodes: Absolute names of the grasp generation method's nodes; empty without a method.
         controllers: Names of the controllers to start.
         can_restart: Whether the world can be reset to its state after a cold start.
+        regions: Regions of the launch file, to which each episode adds its own.
     """
 
     package: str
@@ -52,6 +53,7 @@ class StackLaunch:
     controllers: tuple[str, ...]
     _: KW_ONLY
     can_restart: bool
+    regions: Mapping[str, Any] = field(default_factory=dict)
 
 
 class StackError(RuntimeError):

@@ -66,6 +66,10 @@ class Region:
         return [(axis, span) for axis, span in enumerate((self.x, self.y, self.z)) if span is not None]
 
 
+REGIONS = "/regions"
+"""ROS parameter with the regions of the task, by name."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectCondition(Condition):
     """A condition on one object.
