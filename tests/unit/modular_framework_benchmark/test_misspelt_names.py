@@ -228,6 +228,40 @@ def test_two_solvers_that_resolve_to_the_same_method_are_refused_as_equal(
     assert fault in faults and bool(fault) == bool(faults), faults
 
 
+RRT_RANGE = {"parameters": {f"{PIPELINE}/planner_configs/RRT/range": 0.4}}
+OWN_PARAMETER = {"extra_parameters": ["/my_node/gain", "/move_group/max_safe_path_cost"]}
+CHOOSE_RRT = SET_PLANNER.format("ompl/RRT")
+OWN = "  - Own: {source: mine, outcomes: [success], transitions: {success: GenerateGrasps}}\n"
+GOALS = [{"regions": {"goal": {"x": [low, 0.2], "y": [0.4, 0.5]}}} for low in (0.1, 0.15)]
+
+
+@pytest.mark.parametrize(
+    ("base", "first", "second"),
+    [
+        # a node of one's own may read the parameter
+        (OWN_PARAMETER, {"parameters": {"/my_node/gain": 1}}, {"parameters": {"/my_node/gain": 2}}),
+        (OWN_PARAMETER, {}, {"parameters": {"/move_group/max_safe_path_cost": 5}}),
+        # the task uses the planner or the region
+        ({}, {}, {"parameters": {f"{PIPELINE}/planner_configs/RRTConnect/range": 0.4}}),
+        ({"task": "planner.yaml"}, {}, RRT_RANGE),
+        ({"task": "pick_and_place.yaml"}, *GOALS),
+        ({"task": "simulation_pick.yaml", "success": {"in_region": {"region": "goal"}}}, *GOALS),
+        # a state of one's own may use any planner
+        ({"task": "own.yaml"}, {}, RRT_RANGE),
+    ],
+    ids=str,
+)
+def test_levels_that_something_may_tell_apart_are_taken(base: dict, first: dict, second: dict, tmp_path: Path) -> None:
+    script = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts/pick_and_hold.yaml"
+    for name, state in (("planner", CHOOSE_RRT), ("own", OWN)):
+        (tmp_path / f"{name}.yaml").write_text(script.read_text().replace(FIRST_STATE, state + FIRST_STATE))
+    (tmp_path / "states").mkdir()
+    (tmp_path / "states" / "mine.py").write_text(OWN_STATE)
+    levels = {"factors": {"level": {"first": first, "second": second}}, "compare": "level"}
+    arguments = {**PLAIN["arguments"], "states_directory": str(tmp_path / "states")}
+    assert experiment_faults({**PLAIN, **base, **levels, "arguments": arguments}, tmp_path) == ""
+
+
 @pytest.mark.parametrize("content", [KINEMATICS, GRASPS], ids=lambda content: content["mode"])
 def test_the_dry_run_of_a_mode_with_inverse_kinematics_shows_the_substituted_plugin(content: dict) -> None:
     text = yaml.safe_dump(content)

@@ -19,6 +19,7 @@ from modular_framework_benchmark.experiments.experiment import (
     StoppingKind,
 )
 from modular_framework_benchmark.experiments.factor_reading import (
+    Execution,
     Levels,
     combined_settings,
     note_conflicts,
@@ -336,26 +337,26 @@ class _Reader:
     def _combinations(self, factors: Levels, design: list[dict[str, str]]) -> tuple[Combination, ...]:
         if self._mode is None or not self._refers_to_factors or not all(factors.values()):
             return ()
-        combinations, resolved = [], {}
+        combinations, executions = [], {}
         for item in design:
             node = combined_settings(self._base, factors, item, self._meant_factors)
             read = MODES[self._mode].read(node, self._reading)
-            resolved[tuple(item.items())] = self._resolve_settings(read)
+            executions[tuple(item.items())] = self._resolve_settings(read)
             combinations.append(Combination(item, read.settings, read.objects, read.problems))
         if not len(self._reading.faults):
-            note_equal_levels(factors, resolved, self._reading)
+            note_equal_levels(factors, executions, self._reading)
         return tuple(combinations)
 
-    def _resolve_settings(self, read: ReadSettings[Any]) -> str:
-        """Resolves the names in a combination's settings; returns a text that is equal for equal executions."""
+    def _resolve_settings(self, read: ReadSettings[Any]) -> Execution:
+        """Resolves the names in a combination's settings."""
         check = self._checks.get(str(self._mode))
         checked = CheckedSettings((), as_json(read.settings)) if check is None else check(read)
         for fault in checked.faults:
             self._reading.faults.add(location_below(read.node, fault.keys), fault.text)
         self._substitutions.update(dict.fromkeys(checked.substitutions))
-        if checked.resolved is None:
-            return ""
-        return json.dumps([checked.resolved, read.objects, read.problems], sort_keys=True, default=repr)
+        content = [checked.resolved, read.objects, read.problems]
+        text = "" if checked.resolved is None else json.dumps(content, sort_keys=True, default=repr)
+        return Execution(read.node, text, checked.without_effect)
 
 
 def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueReading) -> Stopping:

@@ -19,6 +19,9 @@ from modular_framework_benchmark.experiments.setting_trees import (
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
 
+MAX_REASONS = 5
+"""Maximum number of settings in the fault of two levels that run the same."""
+_ABSENT = object()
 EXAMPLE = "{grasp_method: {above: {arguments: {...}}, aside: {...}}, object: [cube, can]}"
 
 
@@ -126,25 +129,64 @@ def note_unused(factors: Levels, base: Mapping, node: Mapping, reading: Reading)
             )
 
 
-def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...], str], reading: Reading) -> None:
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """Execution of a combination of levels.
+
+    Attributes:
+        node: Settings as written: base settings overridden by the levels.
+        text: Description of the execution, equal for combinations that run the same; empty if unknown.
+        without_effect: Settings without effect and the reasons, see `CheckedSettings`.
+    """
+
+    node: Mapping
+    text: str
+    without_effect: Map[str, str]
+
+
+Executions = Map[tuple[tuple[str, str], ...], Execution]
+"""Execution of each combination, keyed by its factors and labels."""
+
+
+def note_equal_levels(factors: Levels, executions: Executions, reading: Reading) -> None:
     """Adds a fault for two levels of a factor that execute the same in every combination.
 
     Args:
         factors: Levels of each factor.
-        resolved: Description of the execution of each combination; empty if unknown.
+        executions: Execution of each combination.
         reading: Reader that collects faults.
     """
     for name, levels in factors.items():
-        runs: dict[str, dict[tuple[tuple[str, str], ...], str]] = {label: {} for label in levels}
-        for combination, text in resolved.items():
+        runs: dict[str, dict[tuple[tuple[str, str], ...], Execution]] = {label: {} for label in levels}
+        for combination, execution in executions.items():
             other_levels = tuple(item for item in combination if item[0] != name)
-            runs[dict(combination)[name]][other_levels] = text
+            runs[dict(combination)[name]][other_levels] = execution
         for one, other in itertools.combinations(levels, 2):
-            if runs[one] and runs[one] == runs[other] and all(runs[one].values()):
+            pairs = [(run, runs[other].get(where)) for where, run in runs[one].items()]
+            if pairs and len(pairs) == len(runs[other]) and all(_are_equal(run, same) for run, same in pairs):
                 reading.faults.add(
                     levels[other].value.location,
-                    f"the levels '{one}' and '{other}' of factor '{name}' run the same; change or remove one",
+                    f"the levels '{one}' and '{other}' of factor '{name}' run the same: {_likeness(pairs)}; change or "
+                    "remove one",
                 )
+
+
+def _are_equal(one: Execution, other: Execution | None) -> bool:
+    return other is not None and bool(one.text) and one.text == other.text
+
+
+def _likeness(pairs: Iterable[tuple[Execution, Execution | None]]) -> str:
+    """Returns the reason why the differing settings of two levels execute the same."""
+    reasons: dict[str, None] = {}
+    for pair in pairs:
+        one, other = ({path: value.plain() for path, value in leaves(run.node)} for run in pair if run is not None)
+        known = {name: reason for run in pair if run is not None for name, reason in run.without_effect.items()}
+        for path in dict.fromkeys([*one, *other]):
+            if one.get(path, _ABSENT) != other.get(path, _ABSENT):
+                name = "/".join(path[1:]) if path[0] == "parameters" else f"/{'/'.join(path)}"
+                reasons[f"'{'.'.join(path)}' {known.get(name, 'resolves to the same in both')}"] = None
+    more = [f"and {len(reasons) - MAX_REASONS} more"] if len(reasons) > MAX_REASONS else []
+    return ", ".join([*list(reasons)[:MAX_REASONS], *more]) or "their settings are equal"
 
 
 def combined_settings(

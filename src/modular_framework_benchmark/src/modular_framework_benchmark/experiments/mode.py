@@ -93,11 +93,14 @@ class CheckedSettings:
         resolved: Description of the execution as JSON values, without scenes and problems; equal if the settings
             execute the same.
         substitutions: Substitutions of named planners and solvers, known in advance.
+        without_effect: Settings that change nothing, and the reason as the end of a sentence. The key is the name of a
+            parameter, or `/` and the keys that lead to the value, separated by `/`.
     """
 
     faults: tuple[SettingFault, ...]
     resolved: Any
     substitutions: tuple[str, ...] = ()
+    without_effect: Mapping[str, str] = field(default_factory=dict)
 
 
 SettingsCheck = Callable[[ReadSettings[Any]], CheckedSettings]

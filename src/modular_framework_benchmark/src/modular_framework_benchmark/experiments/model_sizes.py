@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,12 +12,33 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.model_extents import bounding_box, reach
 from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_elements import unknown_content
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
+from modular_framework_simulation.models.xml_nodes import read_xml
 from modular_framework_urdf.rotations import rotate_vector
 
 GAP_M = 0.001
 """Clearance between an object and its surface, so that they are not in contact at the start [m]."""
+
+
+MAX_LINES = 5
+"""Maximum number of lines about a file in a fault."""
+
+
+def listed_lines(lines: Sequence[str]) -> str:
+    """Returns the first lines as text, and the number of further lines."""
+    more = [f"{len(lines) - MAX_LINES} more"] if len(lines) > MAX_LINES else []
+    return "; ".join([*lines[:MAX_LINES], *more])
+
+
+@lru_cache(maxsize=64)
+def unknown_content_of_file(model: Path) -> tuple[str, ...]:
+    """Returns the elements and attributes in a model's file that SDF does not define; empty for an unreadable file."""
+    try:
+        return unknown_content(read_xml(model))
+    except DescriptionError:
+        return ()
 
 
 def resting_height(model: Path, surface_m: float, roll_rad: float, pitch_rad: float, scale: float = 1.0) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.experiments.ros_robot_names import RobotNames
 from modular_framework_control.controller_manager.controller_parameters import parameter_faults
 from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
 from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex
@@ -73,9 +74,21 @@ def _unknown_joints(entry: Mapping[str, Any], joints: tuple[str, ...]) -> list[s
     return [name for name in named if joints and name not in joints]
 
 
-def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[LaunchFault]:
-    """Yields hardware without parameters, and unknown hardware types."""
+def hardware_faults(names: DeclaredNames, launch: LaunchPreview, robot: RobotNames) -> Iterator[LaunchFault]:
+    """Yields hardware without parameters, unknown hardware types, and joints that the robot does not have.
+
+    Args:
+        names: Declared parameters of the launch.
+        launch: Launch to check.
+        robot: Names of the robot.
+    """
+    for name, value in names.naming("joint_prefix") if robot.joints else ():
+        if value not in robot.joint_prefixes:
+            text = f"parameter '{name}': no joint name begins with '{value}_'; {listing(robot.joints)}"
+            yield LaunchFault(name, f"{text}{nearest(value, robot.joint_prefixes)}")
     for part in names.hardware():
+        below = {name: value for name, value in launch.parameters.items() if name.startswith(f"{part}/")}
+        yield from names.below_trees(below, robot.by_kind())
         parameter, parent = f"{part}/type", part.rpartition("/")[0]
         sections = [
             name.removesuffix("/type").lstrip("/")

@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
 from modular_framework_benchmark.experiments.ros_launch_files import (
     ARGUMENTS,
     MOVE_GROUP,
-    REGIONS,
     argument_faults,
+    models_of_launch,
     named_entry_faults,
     program_faults,
+    robot_model,
     sensor_faults,
 )
 from modular_framework_benchmark.experiments.ros_pipeline_names import (
@@ -26,7 +30,13 @@ from modular_framework_benchmark.experiments.ros_pipeline_names import (
     unknown_name,
 )
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
-from modular_framework_benchmark.experiments.ros_task_check import CacheableNames, checked_task
+from modular_framework_benchmark.experiments.ros_task_check import (
+    CacheableNames,
+    CheckedTask,
+    UnusedNames,
+    checked_task,
+)
+from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_core.launching.launch_values import CONFIGURATION
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
@@ -49,6 +59,7 @@ from modular_framework_ros.allowed_names import closest, listing, nearest
 DESCRIPTION = "robot_description"
 PIPELINES = "planning_pipelines"
 RUN_TASK = "run_task"
+MODEL_PATH = "/gazebo_model_path"
 
 
 class LaunchCheck:
@@ -58,8 +69,7 @@ class LaunchCheck:
         launch: Preview of the launch file.
         given: Overriding parameters, keyed by full name.
         extra: Names of overriding parameters that the user's own nodes read.
-        regions: Names of regions that episodes add to the regions of the launch.
-        models: Names of the models of the world and of the objects; None if unknown, and then no model is checked.
+        objects: Names of the objects that an experiment adds to the world; None if unknown: then no model is checked.
     """
 
     def __init__(
@@ -67,12 +77,10 @@ class LaunchCheck:
         launch: LaunchPreview,
         given: Mapping[str, Any] | None = None,
         extra: Container[str] = (),
-        regions: Collection[str] = (),
-        models: Collection[str] | None = None,
+        objects: Collection[str] | None = (),
     ) -> None:
         self._given, self._extra = dict(given or {}), extra
-        self._models = models
-        self._regions = {*regions, *launch.below(REGIONS)}
+        self._objects = objects
         self.launch = launch.with_parameters(self._given)
         self._names = DeclaredNames(self.launch)
         self._pipelines: tuple[str, ...] = ()
@@ -92,7 +100,7 @@ class LaunchCheck:
                 *move_group_faults(self._names, self._given),
                 *(self._planner_faults() if self._node is not None else ()),
                 *controller_faults(self.launch, self._robot.movable_joints),
-                *hardware_faults(self._names, self.launch),
+                *hardware_faults(self._names, self.launch, self._robot),
                 *program_faults(self.launch.nodes),
                 *sensor_faults(self.launch),
                 *argument_faults(self.launch, self._robot),
@@ -161,18 +169,42 @@ class LaunchCheck:
         if robot.fault:
             yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {robot.fault}", ARGUMENTS)
             return
+        for text in robot.misspelt:
+            yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {text}", ARGUMENTS)
         for name, value in self._names.naming("joint") if robot.joints else ():
             if value not in robot.joints:
                 yield unknown_name(name, "joint", value, robot.joints)
         yield from self._names.below_trees(self._given, robot.by_kind())
 
     def _model_faults(self) -> Iterator[LaunchFault]:
-        """Yields the named models and objects that are missing in the world."""
-        if self._models is None:
+        """Yields an unreadable world, objects with the name of the robot, and named models that are missing."""
+        try:
+            models = self._models
+        except UnreadableWorld as error:
+            yield LaunchFault("world_file", str(error), ARGUMENTS)
             return
-        for name, value in self._names.naming("model"):
-            if model_of(value) not in self._models:
-                yield unknown_name(name, "model or object", value, tuple(self._models))
+        robot, task = robot_model(self.launch, self._robot), self._task
+        spawned: Collection[str] = () if task is None else task.models
+        for name, key in (*((name, "objects") for name in self._objects or ()), *((name, "task") for name in spawned)):
+            if name == robot:
+                text = f"the object '{name}' has the name of the robot in the simulation; give the object another name"
+                yield LaunchFault("", text, key)
+        known = (*(models or ()), *spawned)
+        for name, value in self._names.naming("model") if models is not None else ():
+            if model_of(value) not in known and (task is None or value not in task.texts):
+                fault = unknown_name(name, "model or object", value, known)
+                hint = "name it in external_names of the task if another node adds it"
+                yield replace(fault, text=f"{fault.text}; {hint}")
+
+    @property
+    def _models(self) -> tuple[str, ...] | None:
+        """Returns the models of the world and the objects; None if they are unknown, such as on a real robot.
+
+        Raises:
+            UnreadableWorld: The world file is invalid.
+        """
+        world = models_of_launch(self.launch)
+        return None if world is None or self._objects is None else (*world, *self._objects)
 
     def _kinematics_faults(self) -> Iterator[LaunchFault]:
         """Yields unknown groups, solvers and keys of kinematics.yaml."""
@@ -191,12 +223,29 @@ class LaunchCheck:
 
     def resolved_parameters(self) -> dict[str, Any]:
         """Returns the parameters with defaults for those that are not set; equal for equivalent launches."""
-        parameters = self._names.effective_values()
+        parameters = self._unused_names.effective(self._names.effective_values())
         if self._node is None:
             return parameters
         named = (DETECTOR, MANAGER)
         unnamed = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
         return unnamed | resolved_names(self.launch, self._node)
+
+    def without_effect(self) -> dict[str, str]:
+        """Returns the parameters that change nothing in an episode, and the reason as the end of a sentence."""
+        return self._unused_names.reasons()
+
+    @cached_property
+    def _unused_names(self) -> UnusedNames:
+        pipelines = f"{self._node.name}/{PIPELINES}/" if self._node is not None else ""
+        return UnusedNames(self.launch, self._names, self.registry(), pipelines, self._task, self._extra)
+
+    @cached_property
+    def _task(self) -> CheckedTask | None:
+        """Returns the checked task of the launch; None without a task or with a state machine in a file."""
+        node = next((node for node in self.launch.nodes if node.executable == RUN_TASK), None)
+        parameters = self.launch.below(node.name) if node is not None else {}
+        is_task = node is not None and not str(parameters.get("state_machine_to_load", "")).strip()
+        return self._checked_script(parameters) if is_task else None
 
     def kinematics(self) -> dict[str, Any]:
         """Returns the contents of kinematics.yaml; empty without a move_group node."""
@@ -232,20 +281,22 @@ class LaunchCheck:
         yield from (LaunchFault(CONFIGURATION, text, ARGUMENTS) for text in faults)
 
     def _script_faults(self, parameters: Mapping[str, Any]) -> Iterator[LaunchFault]:
-        script = str(parameters.get("task_constructor_script", ""))
-        folders = [
-            pipeline.directories_from(str(parameters.get(f"{kind}_directory", ""))) for kind in ("states", "templates")
-        ]
-        for kind, kind_folders in zip(("states", "templates"), folders, strict=True):
-            for folder in kind_folders:
+        for kind in ("states", "templates"):
+            for folder in _folders_of(parameters, kind):
                 if not folder.is_dir():
                     name = f"{kind}_directory"
                     yield LaunchFault(name, f"argument '{name}': there is no folder {folder}", ARGUMENTS)
                     return
-        names = self._known_names(str(parameters.get("config_directory", "")))
-        checked = checked_task(script, tuple(folders[0]), tuple(folders[1]), CacheableNames(names))
+        checked = self._task or CheckedTask()
         yield from checked.faults
         yield from self._task_planner_faults(checked.planners)
+
+    def _checked_script(self, parameters: Mapping[str, Any]) -> CheckedTask:
+        """Returns the checked task in the parameters of run_task."""
+        script = str(parameters.get("task_constructor_script", ""))
+        states, templates = (_folders_of(parameters, kind) for kind in ("states", "templates"))
+        names = self._known_names(str(parameters.get("config_directory", "")))
+        return checked_task(script, states, templates, CacheableNames(names))
 
     def _task_planner_faults(self, planners: Iterable[str]) -> Iterator[LaunchFault]:
         """Yields the invalid settings of the planners that only the task names."""
@@ -261,11 +312,24 @@ class LaunchCheck:
         names = names_of_config(Path(config)) if config else KnownNames()
         srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
         names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
-        names = names.with_regions(self._regions, "the launch argument 'regions', or to 'regions' of the experiment")
-        if self._models is not None:
-            names = names.with_models(self._models, "the world, or to 'objects' of the experiment")
+        folders = str(self.launch.parameters.get(MODEL_PATH) or "")
+        names = names.with_object_types(folders, f"the parameter {MODEL_PATH}, {folders}") if folders else names
+        names = names.with_regions(
+            self.launch.below(REGIONS), "the launch argument 'regions', or to 'regions' of the experiment"
+        )
+        try:
+            models = self._models
+        except UnreadableWorld:  # reported with the models
+            models = None
+        if models is not None:
+            names = names.with_models(models, "the world, or to 'objects' of an experiment")
         registry = self.registry()
         return names if registry is None else names.with_planners(lambda: PlannerNames(registry.by_pipeline()))
+
+
+def _folders_of(parameters: Mapping[str, Any], kind: str) -> tuple[Path, ...]:
+    """Returns the folders of the user with states or templates, in the parameters of run_task."""
+    return tuple(pipeline.directories_from(str(parameters.get(f"{kind}_directory", ""))))
 
 
 def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:

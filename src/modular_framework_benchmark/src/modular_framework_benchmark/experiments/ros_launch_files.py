@@ -12,7 +12,9 @@ import rospkg
 from catkin.find_in_workspaces import find_in_workspaces
 from roslib.packages import find_node
 
+from modular_framework_benchmark.experiments.ros_resource_lookup import models_of_world
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames
+from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.launching.ros_declared_names import LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
@@ -29,7 +31,6 @@ from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting
 
 SENSOR_FRAMES, MOVE_GROUP, SIMULATION = "sensors_tf2_broadcaster", "move_group", "simulation"
 ARGUMENTS = "arguments"
-REGIONS = "/regions"
 
 
 def program_faults(nodes: Iterable[LaunchedNode]) -> Iterator[LaunchFault]:
@@ -75,6 +76,25 @@ def argument_faults(launch: LaunchPreview, robot: RobotNames) -> Iterator[Launch
     if prefix and robot.links and not manipulator_links(robot.links, prefix):
         hint = f"no link name contains it; the links are: {', '.join(robot.links)}"
         yield LaunchFault(name, f"argument '{name}' is '{prefix}', but {hint}", ARGUMENTS)
+
+
+def robot_model(launch: LaunchPreview, robot: RobotNames) -> str:
+    """Returns the name of the robot among the models of the simulation; empty without a simulated robot."""
+    node = next((node for node in launch.nodes if node.executable == SIMULATION), None)
+    return "" if node is None else str(launch.parameters.get(f"{node.name}/robot_name") or robot.robot)
+
+
+def models_of_launch(launch: LaunchPreview) -> tuple[str, ...] | None:
+    """Returns the models of the simulated world; None without a simulation, or if the world file is not found.
+
+    Raises:
+        UnreadableWorld: The world file is invalid.
+    """
+    node = next((node for node in launch.nodes if node.executable == SIMULATION), None)
+    file = Path(str(launch.parameters.get(f"{node.name}/world_file") or "")) if node is not None else Path()
+    if not file.is_absolute() or not file.is_file():
+        return None
+    return tuple(models_of_world(file, str(launch.parameters.get("/gazebo_model_path") or "")))
 
 
 def _region_faults(launch: LaunchPreview) -> Iterator[LaunchFault]:

@@ -11,7 +11,7 @@ import roslaunch.core
 import roslaunch.substitution_args
 import rospkg
 
-from modular_framework_benchmark.experiments.model_sizes import movable_joints
+from modular_framework_benchmark.experiments.model_sizes import listed_lines, movable_joints
 from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld, UnresolvedReference
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
 from modular_framework_core.launching.launch_arguments import (
@@ -108,7 +108,7 @@ class RosResourceLookup:
         """Returns the movable joints of each model in the world of a launch, keyed by model."""
         description = self._description(launch, arguments)
         file = self._launch_values(launch, arguments).get("world_file", "")
-        return _models_of(description / "worlds" / file, description / "models") if file else {}
+        return models_of_world(description / "worlds" / file, str(description / "models")) if file else {}
 
     def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
         package = self._launch_values(launch, arguments).get("description_package", "")
@@ -126,11 +126,22 @@ class RosResourceLookup:
 
 
 @lru_cache(maxsize=64)
-def _models_of(world: Path, models: Path) -> dict[str, tuple[str, ...]]:
+def models_of_world(world: Path, models: str) -> Mapping[str, tuple[str, ...]]:
+    """Returns the movable joints of each model in a world, keyed by model.
+
+    Args:
+        world: World file.
+        models: Folders of models, separated by colons.
+
+    Raises:
+        UnreadableWorld: The world does not exist or is invalid, or has elements that SDF does not define.
+    """
     try:
-        content = read_world(world, ros_resources(str(models)))
+        content = read_world(world, ros_resources(models))
     except DescriptionError as error:
         raise UnreadableWorld(f"the world cannot be read: {error}") from error
+    if content.unknown:
+        raise UnreadableWorld(f"the world has unknown content: {listed_lines(content.unknown)}")
     return {model.name: movable_joints(model) for model in content.models}
 
 

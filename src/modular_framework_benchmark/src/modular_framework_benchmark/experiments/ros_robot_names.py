@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from modular_framework_planning.robot_model.multi_dof_joint import FLOATING, PLANAR, MultiDofJoint
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.urdf_extensions import misspelt_extensions
+from modular_framework_simulation.models.xml_nodes import parse_xml
 from modular_framework_urdf.srdf_reader import read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -22,6 +25,8 @@ class RobotNames:
         movable_joints: Movable joints, and the variables of planar or floating virtual joints.
         links: All links.
         fault: Error of an invalid URDF; empty for a valid one.
+        robot: Name of the robot in its URDF.
+        misspelt: Misspelt elements and references of the `<gazebo>` elements of the URDF.
     """
 
     groups: tuple[str, ...] = ()
@@ -29,6 +34,14 @@ class RobotNames:
     movable_joints: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
     fault: str = ""
+    robot: str = ""
+    misspelt: tuple[str, ...] = ()
+
+    @property
+    def joint_prefixes(self) -> tuple[str, ...]:
+        """Returns the parts of joint names in front of an underscore."""
+        ends = ((joint, end) for joint in self.joints for end, letter in enumerate(joint) if letter == "_")
+        return tuple(sorted({joint[:end] for joint, end in ends if end}))
 
     def by_kind(self) -> dict[str, tuple[str, ...]]:
         """Returns the known names, keyed by the kinds in parameter declarations."""
@@ -59,4 +72,13 @@ def robot_names(urdf: str, srdf: str) -> RobotNames:
         return RobotNames(groups)
     movable = tuple(joint.name for joint in robot.joints if joint.kind != "fixed")
     links = tuple(link.name for link in robot.links)
-    return RobotNames(groups, tuple(joint.name for joint in robot.joints), (*movable, *variables), links)
+    joints = tuple(joint.name for joint in robot.joints)
+    return RobotNames(groups, joints, (*movable, *variables), links, robot=robot.name, misspelt=_misspelt(urdf))
+
+
+def _misspelt(urdf: str) -> tuple[str, ...]:
+    """Returns the misspelt parts of the `<gazebo>` elements of a URDF."""
+    try:
+        return tuple(misspelt_extensions(parse_xml(urdf, "robot_description")))
+    except DescriptionError:
+        return ()  # the simulation reports the reason

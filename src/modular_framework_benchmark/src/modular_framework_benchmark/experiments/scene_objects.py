@@ -16,7 +16,14 @@ from modular_framework_benchmark.experiments.distributions import (
     generator_of,
     read_distribution,
 )
-from modular_framework_benchmark.experiments.model_sizes import longest_side, lowest_point, resting_height, sides
+from modular_framework_benchmark.experiments.model_sizes import (
+    listed_lines,
+    longest_side,
+    lowest_point,
+    resting_height,
+    sides,
+    unknown_content_of_file,
+)
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
 from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.records.episode_settings import PlacedObject
@@ -281,6 +288,8 @@ def _named_objects(
 def _check_model(node: Mapping, objects: Sequence[SceneObject], reading: Reading) -> None:
     """Adds a fault if the model cannot rest on a surface, have a size, or stand beside others of its kind."""
     file = objects[0].file
+    if unknown := unknown_content_of_file(file):
+        reading.faults.add(node.entries["model"].location, f"the model has unknown content: {listed_lines(unknown)}")
     checks: dict[str, Callable[[], object]] = {
         SURFACE: lambda: lowest_point(file, 0.0, 0.0),
         SIZE: lambda: longest_side(file),

@@ -44,9 +44,11 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
 )
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_ros.allowed_names import listing, nearest
-from modular_framework_ros.parameter_declarations import NodeDeclaration, node_declaration
+from modular_framework_ros.parameter_declarations import NodeDeclaration, existing_declaration, node_declaration
 from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE, Figure
 
+GENERATOR_NODE = ("modular_framework_core", "grasp_generator")
+"""Declaration of the parameters that the node of a method reads, not the method itself."""
 ALLOWED_METHOD = "allowed: MODULE:CLASS of a grasp method, such as top_down_grasps.ros_top_down_node:TopDownMethod"
 
 
@@ -125,12 +127,17 @@ def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
         ModeError: The class cannot be imported, or a parameter is not allowed.
     """
     kind = method_class(reference)
-    declared = node_declaration(*getattr(kind, "declared_in", ("", ""))) or NodeDeclaration()
     try:
-        method: GraspMethod = kind(GivenParameters(parameters, declared))
+        method: GraspMethod = kind(method_parameters(reference, parameters))
     except TypeError as error:
         raise ModeError(f"method '{reference}' cannot be constructed ({error}); {ALLOWED_METHOD}") from error
     return method
+
+
+def method_parameters(reference: str, parameters: Mapping[str, Any]) -> GivenParameters:
+    """Returns the parameters of a method, with the arguments and errors of `load_method`."""
+    declared_in = getattr(method_class(reference), "declared_in", ("", ""))
+    return GivenParameters(parameters, node_declaration(*declared_in) or NodeDeclaration())
 
 
 def method_class(reference: str) -> Any:
@@ -192,22 +199,35 @@ class GivenParameters:
         values: Values by name, without the ~ of private parameters.
         declared: Parameters that the method declares.
 
+    Attributes:
+        values: Value or default of each parameter; a whole number of type float is a float.
+
     Raises:
-        ModeError: The method does not declare a parameter, or a value is not allowed.
+        ModeError: The method does not declare a parameter, only its node reads the parameter, or a value is not
+            allowed.
     """
 
     def __init__(self, values: Mapping[str, Any], declared: NodeDeclaration) -> None:
         own = {name[1:]: item for name, item in declared.parameters.items() if name.startswith("~")}
+        of_node = existing_declaration(*GENERATOR_NODE).parameters
+        settable = [name for name in sorted(own) if f"~{name}" not in of_node]
         faults = []
         for name, value in values.items():
-            if name not in own:
-                faults.append(f"the method has no '{name}'; {listing(sorted(own))}{nearest(name, own)}")
+            if name in own and name not in settable:
+                text = f"'{name}' has no effect in this mode, because only the node of the method reads it"
+                faults.append(f"{text}; {listing(settable)}")
+            elif name not in own:
+                faults.append(f"the method has no '{name}'; {listing(settable)}{nearest(name, settable)}")
             elif own[name].fault(value):
                 faults.append(f"'{name}' {own[name].fault(value)}")
         if faults:
             raise ModeError(f"method_parameters: {'; '.join(faults)}")
-        self._values = {name: values.get(name, item.default) for name, item in own.items()}
+        self.values = {
+            name: float(value) if item.type == "float" and value is not None else value
+            for name, item in own.items()
+            for value in [values.get(name, item.default)]
+        }
 
     def __call__(self, name: str) -> Any:
         """Returns the given value of a parameter, or its default."""
-        return self._values[name.removeprefix("~")]
+        return self.values[name.removeprefix("~")]

@@ -112,7 +112,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]
     def prepare(self, settings: PlanningSettings) -> _PlanningSetup:
         """Returns the robot and the started planning process, whose start is no part of a plan."""
         robot = self.robot(settings.robot)
-        spec = _pipeline_spec(robot, settings)
+        spec = pipeline_spec(robot, settings)
         pipeline = spec.build(robot.model, robot.solvers())
         _check_planner(pipeline, settings.planner)
         seeded = SeededPlanning(robot.model, [spec])
@@ -124,7 +124,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]
         prepared.seeded.close()
 
 
-def _pipeline_spec(robot: Robot, settings: PlanningSettings) -> PipelineSpec:
+def pipeline_spec(robot: Robot, settings: PlanningSettings) -> PipelineSpec:
     """Returns the pipeline of the robot's configuration with the episode's parameters, at full speed.
 
     Full speed makes the durations of motions compare planners instead of scaling factors.

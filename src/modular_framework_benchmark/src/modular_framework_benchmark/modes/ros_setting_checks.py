@@ -3,26 +3,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.episodes.ros_file_digests import file_digest
 from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSettings
 from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingFault
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.experiments.problem_sets import Problem
-from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
-from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
+from modular_framework_benchmark.experiments.ros_task_check import PLANNER_CONFIGS, has_framework_plugins
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
-from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method, method_class
+from modular_framework_benchmark.modes.ros_grasp_runner import (
+    GraspEpisodeRunner,
+    load_method,
+    method_class,
+    method_parameters,
+)
 from modular_framework_benchmark.modes.ros_grasp_widths import grasp_width_faults
 from modular_framework_benchmark.modes.ros_kinematics_runner import (
     KinematicsEpisodeRunner,
@@ -31,7 +37,13 @@ from modular_framework_benchmark.modes.ros_kinematics_runner import (
 )
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
-from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner, load_problem
+from modular_framework_benchmark.modes.ros_planning_runner import (
+    PLUGINS,
+    PlanningEpisodeRunner,
+    load_problem,
+    pipeline_spec,
+)
+from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_benchmark.records.episode_settings import SettingsError, as_json
 from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
@@ -46,6 +58,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
+MAX_PATH_LENGTH = 1000
 MAX_PROBLEM_FAULTS = 5
 """Maximum number of problems whose faults are listed."""
 MOVE_GROUP_NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
@@ -135,7 +148,9 @@ def check_grasps(runner: GraspEpisodeRunner, read: ReadSettings[GraspSettings]) 
         faults += _faults_of([(("gripper_joint",), lambda: runner.cached_setup(settings))])
         if not faults:
             named = runner.cached_setup(settings).solver.settings.solver
-            return CheckedSettings((), as_json(settings), solver_substitutions([named]))
+            values = method_parameters(settings.method, settings.method_parameters).values
+            resolved = as_json(replace(settings, method_parameters=values))
+            return CheckedSettings((), resolved, solver_substitutions([named]))
     return CheckedSettings(tuple(faults), None)
 
 
@@ -146,11 +161,12 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
     settings, is_known = read.settings, "arguments" not in read.unreadable
     try:
         stack = preview_stack(settings)
-        launch = stack.preview
+        regions = {region.name: region.as_parameter for region in settings.regions}
+        launch = stack.preview.with_parameters({REGIONS: regions} if regions else {})
     except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
-    regions = [region.name for region in settings.regions]
-    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters, regions, _models(read))
+    objects = None if "objects" in read.unreadable or not is_known else [item.name for item in read.objects]
+    check = LaunchCheck(launch, settings.parameters, settings.extra_parameters, objects)
     found = check.faults() if is_known else check.faults_of_values()
     faults = tuple(
         SettingFault((item.key, item.name) if item.name else (item.key,), item.text)
@@ -165,26 +181,27 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
     return CheckedSettings(
         (),
         {
-            **as_json(replace(settings, arguments={}, parameters={}, launch="")),
+            **as_json(replace(settings, arguments={}, parameters={}, launch="", regions=(), extra_parameters=())),
+            "task": _content_of(settings.task),
             "nodes": sorted(map(repr, check.launch.nodes)),
-            "parameters": {**check.resolved_parameters(), "/planner_name": repr(check.planner())},
+            "parameters": {
+                **{name: _content_of(value) for name, value in check.resolved_parameters().items()},
+                "/planner_name": repr(check.planner()),
+            },
         },
         (
             *_substitutions(check.registry(), check.planner()),
             *solver_substitutions(named_solvers(check.kinematics())),
         ),
+        {**check.without_effect(), "/extra_parameters": "sets no value"},
     )
 
 
-def _models(read: ReadSettings[TaskSettings]) -> tuple[str, ...] | None:
-    """Returns the names of the models of the world and of the objects; None if the names are unknown."""
-    if read.unreadable & {"arguments", "objects"}:
-        return None
-    try:
-        world = RosResourceLookup().world_models(read.settings.launch, read.settings.arguments)
-    except UnresolvedReference:
-        return None
-    return (*world, *(item.name for item in read.objects))
+def _content_of(value: Any) -> Any:
+    """Returns a value; for the path of a file, its folder and a digest, which are equal for a copy of the file."""
+    if isinstance(value, str) and value.startswith("/") and len(value) < MAX_PATH_LENGTH and Path(value).is_file():
+        return f"{Path(value).parent}: {file_digest(Path(value))}"
+    return value
 
 
 def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
@@ -210,8 +227,51 @@ def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSet
     planner = None
     if "planner" not in read.unreadable:
         planner = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
-    resolved = as_json(replace(settings, planner=repr(planner)))
-    return CheckedSettings(tuple(faults), resolved, _substitutions(check.registry(), planner))
+    if planner is None or faults or read.unreadable:
+        return CheckedSettings(tuple(faults), None)
+    return CheckedSettings(
+        (),
+        _resolved_planning(robot, settings, planner),
+        _substitutions(check.registry(), planner),
+        _unused_configurations(settings, planner),
+    )
+
+
+def _resolved_planning(robot: Robot, settings: PlanningSettings, planner: ResolvedPlanner) -> Any:
+    """Returns the settings of the mode `planning` with the parameters of the pipeline and of the planner that run."""
+    spec = pipeline_spec(robot, settings)
+    if has_framework_plugins(spec):
+        parameters = {name: value for name, value in spec.settings.parameters.items() if name != PLANNER_CONFIGS}
+        spec = replace(spec, settings=replace(spec.settings, planner_configs={}, parameters=parameters))
+    planner = replace(planner, settings={**planner.settings, **settings.planner_parameters})
+    resolved = {
+        **as_json(replace(settings, planner="", planner_parameters={}, parameters={}, pipeline="")),
+        "planner": as_json(planner),
+        "pipeline": as_json(spec),
+    }
+    return _with_floats(resolved)
+
+
+def _with_floats(value: Any) -> Any:
+    """Returns JSON values with whole numbers as floats, which planners read alike."""
+    match value:
+        case Mapping():
+            return {str(name): _with_floats(item) for name, item in value.items()}
+        case list() | tuple():
+            return [_with_floats(item) for item in value]
+        case int() if not isinstance(value, bool):
+            return float(value)
+    return value
+
+
+def _unused_configurations(settings: PlanningSettings, planner: ResolvedPlanner) -> dict[str, str]:
+    """Returns the parameters of other planners, and the reason why they have no effect."""
+    reasons = {}
+    for name in leaves(settings.parameters):
+        configuration = name.partition(f"/{PLANNER_CONFIGS}/")[2].split("/")[0]
+        if configuration not in ("", settings.planner, planner.planner):
+            reasons[name] = f"belongs to the planner '{configuration}', which does not run"
+    return reasons
 
 
 def _problem_faults(read: ReadSettings[PlanningSettings], robot: Robot) -> Iterator[SettingFault]:
@@ -295,6 +355,9 @@ def _planner(
 
 
 def _setting_faults(check: LaunchCheck, planner: ResolvedPlanner, settings: PlanningSettings) -> Iterator[SettingFault]:
+    if settings.planner_parameters and not settings.planner:
+        text = "planner_parameters has no effect without a planner; name the planner with the key planner"
+        yield SettingFault(("planner_parameters",), text)
     for key, value in settings.planner_parameters.items():
         registry = check.registry()
         for text in registry.faults(planner, {key: value}) if registry is not None else ():

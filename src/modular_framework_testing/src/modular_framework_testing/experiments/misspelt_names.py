@@ -404,11 +404,97 @@ def in_world(old: str, new: str, words: str) -> Case:
     return Case("world of an experiment", new, refusal_text, words)
 
 
+def in_robot(new: str, words: str) -> Case:
+    """Returns the case of a wrong element in the robot description that run_framework starts.
+
+    Args:
+        new: Wrong element at the end of the description.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        urdf = Path(rospkg.RosPack().get_path("ur5_ezgripper_robot")) / "urdf"
+        text = (urdf / "ur5_with_ezgripper.urdf.xacro").read_text()
+        (folder / "mine.urdf.xacro").write_text(_replace_first(text, "</robot>", f"{new}</robot>"))
+        name = os.path.relpath(folder / "mine.urdf.xacro", urdf)
+        return in_launch(f"robot_urdf_file:={name}", "").refusal_text(folder)
+
+    return Case("robot description", new, refusal_text, words)
+
+
+def in_levels(base: dict[str, Any], first: dict[str, Any], second: dict[str, Any], words: str) -> Case:
+    """Returns the case of an experiment whose two levels run the same.
+
+    Args:
+        base: Correct experiment.
+        first: Settings of the first level.
+        second: Settings of the second level.
+        words: Pattern of the refusal, which begins with the reason.
+    """
+    content = {**base, "factors": {"level": {"first": first, "second": second}}, "compare": "level"}
+    likeness = f"levels 'first' and 'second' of factor 'level' run the same: .*{words}"
+    return Case(
+        f"{base['mode']}: levels", f"{first} and {second}", lambda folder: experiment_faults(content, folder), likeness
+    )
+
+
+def in_copied_tasks(words: str) -> Case:
+    """Returns the case of two levels whose tasks are copies of a file.
+
+    Args:
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        script = (
+            Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts/pick_and_hold.yaml"
+        )
+        for name in ("first", "second"):
+            (folder / f"{name}.yaml").write_text(script.read_text())
+        return in_levels(PLAIN, {"task": "first.yaml"}, {"task": "second.yaml"}, "").refusal_text(folder)
+
+    return Case("task: levels", "a copy of the task", refusal_text, words)
+
+
+def in_model(old: str, new: str, words: str) -> Case:
+    """Returns the case of a wrong text in the model of an object of an experiment.
+
+    Args:
+        old: Correct text.
+        new: Wrong text.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        (folder / "drawer").mkdir()
+        (folder / "drawer" / "model.sdf").write_text(_replace_first(DRAWER, old, new))
+        drawer = {"model": "drawer/model.sdf", "name": "drawer", "x": 0.5, "y": 0.5, "z": 0.9}
+        return experiment_faults({**TASK, "objects": [*TASK["objects"], drawer]}, folder)
+
+    return Case("model of an object", new, refusal_text, words)
+
+
+def in_launched_task(text: str, words: str) -> Case:
+    """Returns the case of a task that run_framework starts without an experiment.
+
+    Args:
+        text: Task.
+        words: Pattern of the refusal.
+    """
+
+    def refusal_text(folder: Path) -> str:
+        (folder / "own.yaml").write_text(text)
+        return in_launch(f"task_constructor_script:={folder / 'own.yaml'}", "").refusal_text(folder)
+
+    return Case("task of run_framework", text.rpartition("{source")[2].split("\n")[0], refusal_text, words)
+
+
 DRAWER = """<sdf version="1.6"><model name="drawer">
 <link name="cabinet"><inertial><mass>5</mass></inertial>
 <collision name="c"><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision></link>
 <link name="tray"><inertial><mass>1</mass></inertial>
-<collision name="c"><geometry><box><size>0.05 0.05 0.05</size></box></geometry></collision></link>
+<collision name="c"><geometry><box><size>0.05 0.05 0.05</size></box></geometry>
+<surface><friction><ode><mu>0.6</mu></ode></friction></surface></collision></link>
 <joint name="slide" type="prismatic"><parent>cabinet</parent><child>tray</child>
 <axis><xyz>1 0 0</xyz><limit><lower>0</lower><upper>0.2</upper></limit></axis></joint>
 </model></sdf>
@@ -437,6 +523,12 @@ source: framework_state_machine
 outcomes: [done, gave_up]
 states:
   - A: {{source: set_planner, planner_id: {}, transitions: {{success: done, fail: gave_up}}}}
+"""
+OBJECT_TASK = """name: own
+source: framework_state_machine
+outcomes: [done, gave_up]
+states:
+  - A: {{source: {}, transitions: {{success: done, fail: gave_up}}}}
 """
 STATE_TASK = """name: own
 source: framework_state_machine
@@ -576,8 +668,39 @@ CASES = [
         PLAIN,
         ("factors", "world"),
         {"a": {"arguments": {"weld_grasps": False}}, "b": {"arguments": {"weld_grasps": False}}},
-        "run the same",
+        "run the same: their settings are equal",
     ),
+    in_levels(
+        PLAIN, {}, {"parameters": {"/move_group/max_safe_path_cost": 5}}, "cost' has no effect; change or remove"
+    ),
+    in_levels(
+        PLAIN,
+        {},
+        {"parameters": {f"{PIPELINE}/planner_configs/RRT/range": 0.4}},
+        "RRT/range' belongs to the planner 'RRT', which the task does not use",
+    ),
+    in_levels(
+        PLAIN,
+        {"parameters": {"/move_group/planning_pipelines/stomp/stomp_moveit/num_rollouts": 5}},
+        {"parameters": {"/move_group/planning_pipelines/stomp/stomp_moveit/num_rollouts": 9}},
+        "belongs to the pipeline 'stomp', which the task does not use",
+    ),
+    in_levels(
+        PLAIN,
+        {},
+        {"regions": {"spare": {"x": [0.1, 0.2], "y": [0.4, 0.5]}}},
+        "belongs to the region 'spare', which the task does not use",
+    ),
+    in_levels(
+        PLAIN,
+        {"arguments": {"regions": "{spare: {x: [0.1, 0.2]}}"}},
+        {"arguments": {"regions": "{spare: {x: [0.1, 0.3]}}"}},
+        "'arguments.regions' resolves to the same in both",
+    ),
+    in_copied_tasks("'first' and 'second' of factor 'level' run the same: 'task' resolves to the same in both"),
+    in_levels(PLAIN, {}, {"extra_parameters": ["/my_node/gain"]}, "'extra_parameters' sets no value"),
+    in_levels(PLAIN, {}, {"arguments": {"viewer_port": 8081}}, "'arguments.viewer_port' resolves to the same in both"),
+    in_levels(PLAIN, {}, {"arguments": {"generated_state_machine_name": "mine"}}, "resolves to the same in both"),
     # The task that an experiment names
     in_task("source: plan", "source: plann", "did you mean 'plan'"),
     in_task("target_state_type: joint_state", "target_state_type: joint_stat", "joint_state"),
@@ -590,6 +713,23 @@ CASES = [
         f"{SET_PLANNER.format('RRT')}{FIRST_STATE}",
         "planner 'RRT', which the task names: .*'goal_bias' is '2.0'",
         {f"{PIPELINE}/planner_configs/RRT/goal_bias": 2.0},
+    ),
+    in_task(
+        FIRST_STATE,
+        """  - Spawn:
+      {source: spawn_object, object_type: cubee, transitions: {success: GenerateGrasps, fail: quit_pipeline}}
+"""
+        + FIRST_STATE,
+        "object type 'cubee' is unknown; allowed: .*did you mean 'cube'",
+    ),
+    in_task(
+        FIRST_STATE,
+        """  - Spawn:
+      {source: spawn_object, object_type: cube, object_name: ur5_with_ezgripper,
+       transitions: {success: GenerateGrasps, fail: quit_pipeline}}
+"""
+        + FIRST_STATE,
+        "the object 'ur5_with_ezgripper' has the name of the robot",
     ),
     # Other modes
     in_experiment(PLANNING, ("factors", "planner"), ["RRTConnect", "RTT"], "no planner 'RTT'.*did you mean 'RRT'"),
@@ -625,6 +765,27 @@ CASES = [
     in_experiment(GRASPS, ("gripper_joint",), "panda_finger_joint", "panda_finger_joint1"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearance": "wide"}, "is 'wide'; allowed: a number"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearence": 0.01}, "did you mean 'finger_clearance'"),
+    in_experiment(GRASPS, ("method_parameters",), {"max_grasps": 3}, "'max_grasps' has no effect in this mode"),
+    in_levels(
+        {**GRASPS, "method": GRASPS["factors"]["method"][0]},
+        {},
+        {"method_parameters": {"finger_clearance": 0.012}},
+        "'method_parameters.finger_clearance' resolves to the same in both",
+    ),
+    in_levels(
+        {**PLANNING, "planner": "RRTConnect"},
+        {},
+        {"parameters": {f"{PIPELINE}/planner_configs/RRT/range": 0.4}},
+        "belongs to the planner 'RRT', which does not run",
+    ),
+    in_levels(
+        {**PLANNING, "planner": "RRTConnect"},
+        {"planner_parameters": {"range": 0.4}},
+        {"parameters": {f"{PIPELINE}/planner_configs/RRTConnect/range": 0.4}},
+        "'planner_parameters.range' resolves to the same in both",
+    ),
+    in_levels({**PLANNING, "planner": "RRT"}, {"pipeline": "ompl"}, {}, "'pipeline' resolves to the same in both"),
+    in_experiment({**PLANNING, "planner": ""}, ("planner_parameters",), {"range": 0.4}, "no effect without a planner"),
     in_experiment(GRASPS, ("factors", "method"), ["top_down_grasps.ros_top_down_node:TopDown", "b:C"], "MODULE:CLASS"),
     # run_framework and configuration files
     in_launch("planner_name:=BKPIECEE", "no planner 'BKPIECEE'.*did you mean 'BKPIECE'"),
@@ -633,6 +794,11 @@ CASES = [
     in_launch("generated_state_machine_name:=rospy", "is 'rospy', which is the Python module"),
     in_launch("seed:=-4", "is -4; allowed: a whole number, at least 0"),
     in_launch("task_constructor_script:=simulation_pik.yaml", "simulation_pik.yaml"),
+    in_launch("viewer_port:=-3", "'viewer_port' is -3; allowed: a whole number, at least 0 and at most 65535"),
+    in_launch("viewer_port:=70000", "'viewer_port' is 70000; allowed: .*at most 65535"),
+    in_launch("viewer_port:=eight", "'viewer_port' is 'eight'; allowed: a whole number"),
+    in_launch("ui_port:=0", "'ui_port' is 0; allowed: a whole number, at least 1"),
+    in_experiment(PLAIN, ("arguments", "viewer_port"), -3, "'viewer_port' is -3; allowed: a whole number"),
     in_launch("planner_name:=RRTConect", "did you mean 'RRTConnect'", "panda_hand_robot"),
     in_launch("regions:={goal: {x: 3}}", "region 'goal' is {'x': 3}; allowed: spans"),
     in_launch("regions:={goal: {x: [0.2, 0.1]}}", "region 'goal' is .*allowed: spans"),
@@ -685,6 +851,22 @@ CASES = [
     in_hardware("modular_framework_drivers/EzG", "modular_framework_driver/EzG", "framework_drivers/EzGripperRobotHW'"),
     in_hardware("[ur_robot_hw,", "[ur_robot_h,", "no parameter '/ur_robot_h/type'.*did you mean 'ur_robot_hw'"),
     in_hardware("robot_hardware: [", "robot_hardwares: [", "did you mean '/robot_hardware'"),
+    in_hardware('robot_id: ""', 'robot_id: "shoulde"', "no joint name begins with 'shoulde_'.*did you mean 'shoulder'"),
+    in_hardware(
+        "type: modular_framework_drivers/UrArmRobotHW",
+        "type: modular_framework_control/MockRobotHW\n  joints: [elbo_joint]",
+        "parameter '/ur_robot_hw/joints': there is no joint 'elbo_joint'.*did you mean 'elbow_joint'",
+    ),
+    in_hardware(
+        "type: modular_framework_drivers/UrArmRobotHW",
+        "type: modular_framework_control/MockRobotHW\n  initial_positions: {elbo_joint: 1.0}",
+        "'/ur_robot_hw/initial_positions/elbo_joint' names no joint: 'elbo_joint'.*did you mean 'elbow_joint'",
+    ),
+    in_hardware(
+        "type: modular_framework_drivers/EzGripperRobotHW",
+        "type: modular_framework_drivers/EzGripperRobotHW\n  joint: ezgripper_knuckle_palm_L1",
+        "there is no joint 'ezgripper_knuckle_palm_L1'; .*did you mean 'ezgripper_knuckle_palm_L1_",
+    ),
     in_hardware("robot_ip_address", "robot_ip_adress", "did you mean '/ur_robot_hw/robot_ip_address'"),
     in_controllers(
         "position_controllers/JointTrajectoryController",
@@ -718,6 +900,22 @@ CASES = [
         "stack.yaml", "prefix: block", "prefix: blok", "series of objects 'blok' is unknown; .*did you mean 'block'"
     ),
     in_placing_task("stack.yaml", "object_name: userdata", "object_name: blok_1", "'blok_1'.*did you mean 'block_1'"),
+    in_script(
+        OBJECT_TASK.format("spawn_object, object_type: cubee"), "object type 'cubee' is unknown.*did you mean 'cube'"
+    ),
+    in_launched_task(
+        OBJECT_TASK.format("spawn_object, object_type: cann"), "object type 'cann' is unknown.*did you mean 'can'"
+    ),
+    in_launched_task(
+        OBJECT_TASK.format("delete_object, object_name: tabel"), "model 'tabel' is unknown; .*did you mean 'table'"
+    ),
+    in_config(
+        "generative_methods_config.yaml",
+        "top_down_grasp_generator/object_name",
+        "wood_blok",
+        "no model or object 'wood_blok'; .*did you mean 'wood_block'",
+    ),
+    in_experiment(TASK, ("objects", 0, "name"), "ur5_with_ezgripper", "has the name of the robot in the simulation"),
     in_parameters(f"{GENERATOR}/object_name", "cubee", "no model or object 'cubee'; .*did you mean 'cube_1'"),
     in_experiment(TASK, ("objects", 0, "name"), "table", "the world has a model 'table' already"),
     # Planning problems
@@ -766,6 +964,19 @@ CASES = [
     in_drawer({"joint_at_least": {"model": "drawer", "joint": "slidr", "position": 0.1}}, "did you mean 'slide'"),
     in_drawer({"joint_at_least": {"model": "table", "joint": "slide", "position": 0.1}}, "joint of model 'table'"),
     in_drawer({"not": {"joint_at_least": {"model": "drawr", "joint": "slide", "position": 0.1}}}, "mean 'drawer'"),
+    in_robot("<gazebo reference='base_link'><selfColide>1</selfColide></gazebo>", "did you mean 'selfCollide'"),
+    in_robot(
+        "<gazebo reference='base_lnk'><mu1>0.1</mu1></gazebo>", "no link or joint 'base_lnk'; did you mean 'base_"
+    ),
+    in_world(
+        "<include>", "<inclde></inclde><include>", "mine.world:[0-9]+: <inclde>: .*<world>; did you mean 'include'"
+    ),
+    in_world("</world>", "<modl name='x'/></world>", "SDF defines no <modl> in <world>; did you mean 'model'"),
+    in_world("<max_step_size>", "<max_stp_size>2</max_stp_size><max_step_size>", "did you mean 'max_step_size'"),
+    in_model("<friction>", "<frictoin/><friction>", "model.sdf:[0-9]+: <frictoin>: .*did you mean 'friction'"),
+    in_model(
+        "<link name", "<pose relatve_to='tray'/><link name", "no attribute 'relatve_to'; did you mean 'relative_to'"
+    ),
     in_world("model://table", "model://tabel", "mine.world:[0-9]+: .*'model://tabel'.*did you mean 'table'"),
 ]
 
