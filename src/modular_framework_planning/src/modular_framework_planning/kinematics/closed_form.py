@@ -17,6 +17,8 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 PROBE_ANGLE = 0.37  # generic angle at which no two axes align by chance [rad]
 MAX_CACHED_SOLVERS = 4096  # one solver per value of the locked joint
 ALIGNED_WRIST = 0.01  # the wrist is singular if the last three axes span a smaller volume
+ON_FIRST_AXIS = 0.01  # the shoulder is singular at a smaller distance of the wrist centre, as a fraction of the length
+CENTRE_ERROR = 1e-6  # maximum distance of three axes from their common point, as a fraction of the length
 
 
 class ClosedForm:
@@ -47,6 +49,17 @@ class ClosedForm:
         first, second, third = self._axes[-3:]
         normal = np.cross(second, third)
         self._wrist_volume = float(first @ normal), float(first @ np.cross(second, normal))
+        self._length = float(np.linalg.norm(self._offsets[1:], axis=1).sum())
+        self._wrist_in_tip = self._wrist_centre()
+
+    def _wrist_centre(self) -> Array | None:
+        """Returns the common point of the last three axes in the tip frame; None without a spherical wrist."""
+        points = np.cumsum(self._offsets, axis=0)
+        axes, on_axes = self._axes[-3:], points[-4:-1]
+        across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+        centre, *_ = np.linalg.lstsq(across.sum(axis=0), np.einsum("ijk,ik->j", across, on_axes), rcond=None)
+        gaps = np.linalg.norm(np.einsum("ijk,ik->ij", across, centre - on_axes), axis=1)
+        return centre - points[-1] if gaps.max() < CENTRE_ERROR * self._length else None
 
     def _choose_locked_joint(self, name: str) -> int | None:
         """Returns the last joint that can be locked to get a solvable chain; None if no joint needs to be locked."""
@@ -68,6 +81,20 @@ class ClosedForm:
         target[:3, :3] = last_in_base.rotation @ self._rotation
         solutions = np.asarray(self._solver(locked_value).IK(target).Q, dtype=float).reshape(-1, len(self._axes))
         return np.ascontiguousarray(solutions[np.isfinite(solutions).all(axis=1)])
+
+    def has_singular_shoulder(self, last_in_base: Transform) -> bool:
+        """Returns whether the centre of a spherical wrist is on the first axis, for a chain without a locked joint.
+
+        The first joint is then free, and the pose has infinitely many solutions. EAIK returns one value of the joint.
+
+        Args:
+            last_in_base: Pose of the last link in the frame of the base link.
+        """
+        if self._wrist_in_tip is None:
+            return False
+        centre = last_in_base.rotation @ self._rotation @ self._wrist_in_tip + last_in_base.translation
+        distance = np.linalg.norm(np.cross(self._axes[0], centre - self._offsets[0]))
+        return bool(distance < ON_FIRST_AXIS * self._length)
 
     def has_aligned_wrist(self, candidates: Array) -> NDArray[np.bool_]:
         """Returns whether the last three axes are linearly dependent, for a chain without a locked joint.

@@ -82,7 +82,8 @@ class InverseKinematics:
     def is_complete(self, tip_link: str, target: Transform, seed: Array) -> bool:
         """Returns whether `solutions` finds all solutions of a target.
 
-        A closed form of six joints finds all solutions, unless the wrist is singular and has infinitely many solutions.
+        A closed form of six joints finds all solutions, unless the wrist or the shoulder is singular and has infinitely
+        many solutions.
 
         Args:
             tip_link: Link to bring to the target, see tip_offset.
@@ -93,8 +94,10 @@ class InverseKinematics:
         if closed_form is None or closed_form.locked_joint is not None or self.settings.position_only:
             return False
         problem = self._problem(target * self.tip_offset(tip_link, seed), seed)
-        candidates = closed_form.solve(self._target_in_base(problem))
-        return not closed_form.has_aligned_wrist(candidates).any()
+        in_base = self._target_in_base(problem)
+        if closed_form.has_singular_shoulder(in_base):
+            return False
+        return not closed_form.has_aligned_wrist(closed_form.solve(in_base)).any()
 
     def _try_closed_form(self) -> ClosedForm | None:
         chain_joints_between = [
@@ -228,9 +231,11 @@ class InverseKinematics:
         if self._closed_form.locked_joint is None:
             candidates = self._closed_form.solve(in_base)
             solutions = self._polished_solutions(problem, candidates)
-            is_aligned = self._closed_form.has_aligned_wrist(candidates)
-            if is_aligned.any():
-                solutions = np.vstack([solutions, self._singular_solutions(problem, candidates[is_aligned])])
+            is_singular = self._closed_form.has_aligned_wrist(candidates)
+            has_singular_shoulder = self._closed_form.has_singular_shoulder(in_base)
+            if has_singular_shoulder or is_singular.any():
+                starts = candidates if has_singular_shoulder else candidates[is_singular]
+                solutions = np.vstack([solutions, self._singular_solutions(problem, starts)])
             return solutions
         sweep_deadline = 0.5 * (
             time.monotonic() + problem.deadline
@@ -253,7 +258,7 @@ class InverseKinematics:
         return frame.placement.actInv(problem.target)
 
     def _singular_solutions(self, problem: _Problem, candidates: Array) -> Array:
-        """Returns solutions near the seed and near the candidates of a singular wrist, shape (k, joints)."""
+        """Returns solutions near the seed and near the candidates of a singular pose, shape (k, joints)."""
         starts = np.clip(np.vstack([problem.seed, candidates]), problem.lower, problem.upper)
         arrived = search(
             problem.chain,
