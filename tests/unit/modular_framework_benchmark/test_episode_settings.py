@@ -24,6 +24,7 @@ from modular_framework_benchmark.predicates.predicate import All, InOrder, Not
 from modular_framework_benchmark.predicates.predicate import Any as AnyOf
 from modular_framework_benchmark.predicates.progress import Milestone
 from modular_framework_benchmark.records.episode_settings import PlacedObject, SettingsError, as_json, from_json
+from modular_framework_urdf.joint_limits import JointLimits
 
 CAN = PlacedObject("can_1", "can", 1.0, 2.0, 3.0)
 
@@ -106,7 +107,8 @@ def test_a_video_of_what_was_not_recorded_is_refused_with_the_folder(tmp_path: P
 @pytest.mark.parametrize("duration_s", [0.3, 2.0, 10.0])
 def test_a_shake_starts_and_ends_at_rest_where_the_joints_are_and_keeps_their_limits(duration_s: float) -> None:
     start, limits = np.array([0.3, -1.0, 2.0]), np.array([3.0, 0.4, 0.01])
-    times, positions, velocities = shake_motion(start, limits, duration_s)
+    by_joint = {joint: JointLimits(-np.inf, np.inf, limit, np.inf) for joint, limit in zip("abc", limits, strict=True)}
+    times, positions, velocities = shake_motion(start, by_joint, "abc", duration_s)
     assert times[0] == 0.0 and times[-1] == pytest.approx(duration_s) and (np.diff(times) > 0).all()
     np.testing.assert_allclose(positions[[0, -1]], [start, start], atol=1e-12)
     assert not velocities[[0, -1]].any()

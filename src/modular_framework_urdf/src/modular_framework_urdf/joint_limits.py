@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from modular_framework_urdf.robot import Joint
@@ -54,6 +54,27 @@ def described_limits(joint: Joint) -> JointLimits:
     velocity = (joint.limit and joint.limit.velocity) or 0.0
     is_known = 0.0 < velocity < NO_VELOCITY_LIMIT
     return JointLimits(lower, upper, velocity if is_known else DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+
+
+def known_limits(joint: Joint, entry: Mapping[str, Any]) -> JointLimits:
+    """Returns a joint's limits in joint_limits.yaml and the URDF; a velocity or acceleration without limit is infinite.
+
+    Args:
+        joint: Joint of the URDF.
+        entry: Entry of joint_limits.yaml, see `overwritten`.
+
+    Raises:
+        ValueError: A value of the entry is invalid.
+    """
+    limits, _ = overwritten(joint.name, described_limits(joint), entry, joint.kind == "continuous")
+    is_described = joint.limit is not None and 0.0 < (joint.limit.velocity or 0.0) < NO_VELOCITY_LIMIT
+    has_velocity = entry.get("has_velocity_limits", True) and ("max_velocity" in entry or is_described)
+    has_acceleration = entry.get("has_acceleration_limits", True) and "max_acceleration" in entry
+    return replace(
+        limits,
+        velocity=limits.velocity if has_velocity else math.inf,
+        acceleration=limits.acceleration if has_acceleration else math.inf,
+    )
 
 
 def _value(name: str, entry: Mapping[str, Any], flag: bool, key: str) -> float | None:

@@ -12,9 +12,10 @@ from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryG
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
-from modular_framework_benchmark.episodes.shake_motion import limits_in_order, shake_motion
+from modular_framework_benchmark.episodes.shake_motion import shake_motion
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_for_action, wait_for_result
+from modular_framework_urdf.joint_limits import JointLimits, known_limits
 from modular_framework_urdf.urdf_reader import read_urdf
 
 ACTION_TIMEOUT_S = 30.0
@@ -35,11 +36,12 @@ def shake(samples: Samples, duration_s: float) -> float:
         ROS time of the start [s].
 
     Raises:
-        ShakeError: There is no trajectory controller, or the controller rejects or aborts the motion.
+        ShakeError: There is no trajectory controller, a joint limit is invalid, or the controller rejects or aborts
+            the motion.
         CallError: The controller does not answer.
     """
     controller, joints, positions = _arm(samples)
-    times, points, speeds = shake_motion(positions, _speed_limits(joints), duration_s)
+    times, points, speeds = shake_motion(positions, _limits(), joints, duration_s)
     action = f"/{controller}/follow_joint_trajectory"
     client = SteadyActionClient(action, FollowJointTrajectoryAction)
     wait_for_action(client, action, ACTION_TIMEOUT_S)
@@ -65,7 +67,18 @@ def _arm(samples: Samples) -> tuple[str, list[str], Any]:
     return name, list(message.joint_names), np.array(message.desired.positions)
 
 
-def _speed_limits(joints: list[str]) -> Any:
+def _limits() -> dict[str, JointLimits]:
+    """Returns the limits of all joints from the robot description and joint_limits.yaml.
+
+    Raises:
+        ShakeError: A limit is invalid.
+    """
     robot = read_urdf(str(rospy.get_param("/robot_description")))
-    limits = {joint.name: joint.limit.velocity for joint in robot.joints if joint.limit is not None}
-    return limits_in_order(joints, {name: value for name, value in limits.items() if value})
+    entries = rospy.get_param("/robot_description_planning/joint_limits", {})
+    found = {}
+    for joint in robot.joints:
+        try:
+            found[joint.name] = known_limits(joint, entries.get(joint.name) or {})
+        except ValueError as error:
+            raise ShakeError(f"the arm was not shaken: {error}") from error
+    return found
