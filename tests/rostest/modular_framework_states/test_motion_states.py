@@ -42,7 +42,7 @@ class Arm:
     """One joint; the tip is at x = its position. A wall stands at x = 2."""
 
     group_name = "arm"
-    group = SimpleNamespace(tip_link="tip", joints=[SimpleNamespace(name="j", velocity=6.0)])
+    group = SimpleNamespace(tip_link="tip", joints=[SimpleNamespace(name="j", velocity=6.0, acceleration=50.0)])
 
     def __init__(self) -> None:
         self.position, self.executed, self.stuck = 0.0, [], False

@@ -101,5 +101,5 @@ def test_calls_take_an_infinite_timeout() -> None:
 
 
 def test_an_infinite_step_checks_the_points_alone() -> None:
-    points = [SimpleNamespace(positions=[0.0]), SimpleNamespace(positions=[1.0])]
+    points = [SimpleNamespace(positions=[0.0], velocities=[]), SimpleNamespace(positions=[1.0], velocities=[])]
     assert sample_path(SimpleNamespace(points=points), INF) == [(0, [0.0]), (1, [1.0])]

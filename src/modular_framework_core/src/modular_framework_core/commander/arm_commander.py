@@ -76,7 +76,7 @@ class CommanderError(RuntimeError):
 class ArmCommander:
     """Thread-safe client of move_group for one planning group.
 
-    Parameters: ``robot_description``, ``robot_description_semantic``.
+    Parameters: ``robot_description``, ``robot_description_semantic``, ``robot_description_planning/joint_limits``.
     Subscribers: see :class:`JointMonitor` and :class:`PlanningReports`.
     Services called: ``plan_kinematic_path``, ``compute_ik``, ``check_state_validity``, ``query_planner_interface``.
     Actions called: ``execute_trajectory``.
@@ -453,7 +453,8 @@ class ArmCommander:
         for name, text in (("robot_description", urdf), ("robot_description_semantic", srdf)):
             if not text:
                 raise RobotModelError(f"parameter '{rospy.resolve_name(name)}' is not set; load the robot first")
-        group = read_group(str(urdf), str(srdf), self.group_name)
+        limits = rospy.get_param("robot_description_planning/joint_limits", {})
+        group = read_group(str(urdf), str(srdf), self.group_name, limits if isinstance(limits, dict) else {})
         if not group.joints:
             raise RobotModelError(f"group '{self.group_name}' has no active joint; choose one that has")
         return group

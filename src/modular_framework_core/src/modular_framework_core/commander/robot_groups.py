@@ -6,7 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from modular_framework_urdf.joint_limits import known_limits
 from modular_framework_urdf.planning_groups import GroupError, KinematicTree
 from modular_framework_urdf.robot import Joint as UrdfJoint
 from modular_framework_urdf.srdf_reader import GroupSpec, read_srdf
@@ -28,6 +30,7 @@ class Joint:
         upper: Upper position limit [rad or m]; infinity without a limit.
         effort: Effort limit [N m or N]; infinity without a limit.
         velocity: Velocity limit [rad/s or m/s]; infinity without a limit.
+        acceleration: Acceleration limit [rad/s^2 or m/s^2]; infinity without a limit.
     """
 
     name: str
@@ -35,6 +38,7 @@ class Joint:
     upper: float = math.inf
     effort: float = math.inf
     velocity: float = math.inf
+    acceleration: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,29 +76,35 @@ class Group:
         return tuple(joint.name for joint in self.joints)
 
 
-def _joint(joint: UrdfJoint) -> Joint:
+def _joint(joint: UrdfJoint, entry: Mapping[str, Any]) -> Joint:
     limit = joint.limit
+    try:
+        known = known_limits(joint, entry)
+    except ValueError as error:
+        raise RobotModelError(str(error)) from error
     bounded = limit is not None and joint.kind != "continuous"
     return Joint(
         name=joint.name,
         lower=limit.lower if limit is not None and bounded else -math.inf,
         upper=limit.upper if limit is not None and bounded else math.inf,
         effort=math.inf if limit is None or limit.effort is None else limit.effort,
-        velocity=math.inf if limit is None or limit.velocity is None else limit.velocity,
+        velocity=known.velocity,
+        acceleration=known.acceleration,
     )
 
 
-def read_group(urdf: str, srdf: str, name: str) -> Group:
+def read_group(urdf: str, srdf: str, name: str, limits: Mapping[str, Any] | None = None) -> Group:
     """Returns a planning group with its subgroups merged.
 
     Args:
         urdf: URDF text.
         srdf: SRDF text.
         name: Name of the group.
+        limits: Entries of joint_limits.yaml by joint, for velocities and accelerations.
 
     Raises:
-        RobotModelError: A description is invalid, the group is unknown, or the group refers to an unknown group, joint
-            or link.
+        RobotModelError: A description or limit is invalid, the group is unknown, or the group refers to an unknown
+            group, joint or link.
     """
     try:
         robot = read_urdf(urdf, "robot_description (URDF)")
@@ -107,7 +117,10 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
         members = [joints[member] for member in tree.group_joints(name, semantics) if member in joints]
     except GroupError as error:
         raise RobotModelError(str(error)) from error
-    active = tuple(_joint(joint) for joint in members if joint.is_movable and joint.mimic is None)
+    entries = limits or {}
+    active = tuple(
+        _joint(joint, entries.get(joint.name) or {}) for joint in members if joint.is_movable and joint.mimic is None
+    )
     states = {state: dict(positions) for state, positions in semantics.group_states.get(name, {}).items()}
     return Group(name, active, _tip_link(semantics.groups[name], semantics.groups), states)
 

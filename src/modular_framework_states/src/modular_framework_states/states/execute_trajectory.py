@@ -21,15 +21,18 @@ from modular_framework_core.state_api.option_uses import Named
 from modular_framework_ros.calls import CallError, call_service, wait_for_service
 from modular_framework_states.arm_positions import run_to_end
 from modular_framework_states.manager_clients import ManagerError, selected_or_named
+from modular_framework_states.smooth_timing import smooth_timing
 
 TIMEOUT_S = 10.0
+ROUNDING_S = 0.01
 
 
 class ExecuteTrajectory(FrameworkState):
     """Executes a trajectory of the trajectory manager from the current position; positive if the arm is at its end.
 
     The motion from the current position to the first point is included. As no planner has checked the trajectory, its
-    path is first checked for collisions, and each segment for the joints' maximum velocities.
+    path is first checked for collisions, and each segment for the joints' maximum velocities. Points without velocities
+    are passed smoothly. If their times would require more than the maximum accelerations, the motion takes longer.
 
     Args:
         trajectory_name: Name of the trajectory; empty for the oldest anonymous trajectory. The input key
@@ -58,7 +61,10 @@ class ExecuteTrajectory(FrameworkState):
         try:
             trajectory = selected_or_named(self, userdata, "trajectory", self._name)
             trajectory = start_at_current(trajectory, commander.current_joints())
-            fault = velocity_violation(trajectory, {joint.name: joint.velocity for joint in commander.group.joints})
+            limits = {joint.name: (joint.velocity, joint.acceleration) for joint in commander.group.joints}
+            fault = velocity_violation(trajectory, {name: velocity for name, (velocity, _) in limits.items()})
+            if not fault:
+                trajectory = self._smooth(trajectory, limits, label)
             if not fault and self._step:
                 fault = self._first_contact(commander, trajectory)
         except (ManagerError, CallError, ValueError) as error:
@@ -68,6 +74,21 @@ class ExecuteTrajectory(FrameworkState):
         if fault:
             return self.fail(f"{label} was not executed: {fault}")
         return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, label)
+
+    def _smooth(
+        self, trajectory: JointTrajectory, limits: Mapping[str, tuple[float, float]], label: str
+    ) -> JointTrajectory:
+        result = with_smooth_timing(trajectory, limits)
+        asked_s, needed_s = (each.points[-1].time_from_start.to_sec() for each in (trajectory, result))
+        if needed_s > asked_s + ROUNDING_S:
+            rospy.loginfo(
+                "%s takes %.2f s instead of %.2f s, as the joints need more time at their maximum velocities and "
+                "accelerations",
+                label,
+                needed_s,
+                asked_s,
+            )
+        return result
 
     def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
         """Describes the first collision on the path; empty if the path is free."""
@@ -132,13 +153,52 @@ def velocity_violation(trajectory: JointTrajectory, limits: Mapping[str, float])
     return ""
 
 
+def with_smooth_timing(trajectory: JointTrajectory, limits: Mapping[str, tuple[float, float]]) -> JointTrajectory:
+    """Returns a trajectory with velocities and, if required, later times; points with velocities are not changed.
+
+    Args:
+        trajectory: Points at increasing times.
+        limits: Maximum velocity and acceleration of each joint [rad/s, rad/s^2 or m/s, m/s^2].
+
+    Raises:
+        ValueError: The times do not increase.
+    """
+    points = trajectory.points
+    if len(points) < 2 or any(point.velocities for point in points):
+        return trajectory
+    timing = smooth_timing(
+        np.array([point.time_from_start.to_sec() for point in points]),
+        np.array([point.positions for point in points], dtype=float),
+        *np.array([limits[joint] for joint in trajectory.joint_names], dtype=float).T,
+    )
+    return JointTrajectory(
+        header=trajectory.header,
+        joint_names=trajectory.joint_names,
+        points=[
+            JointTrajectoryPoint(
+                positions=point.positions, velocities=velocities, time_from_start=rospy.Duration.from_sec(time_s)
+            )
+            for point, velocities, time_s in zip(points, timing.velocities.tolist(), timing.times.tolist(), strict=True)
+        ],
+    )
+
+
 def sample_path(trajectory: JointTrajectory, step: float) -> list[tuple[int, list[float]]]:
-    """Returns states on the segments between points, each with the index of the segment's end point."""
-    rows = [np.asarray(point.positions, dtype=float) for point in trajectory.points]
-    result = [(0, rows[0].tolist())]
-    for number, (start, end) in enumerate(zip(rows[:-1], rows[1:], strict=True), start=1):
-        count = max(1, int(np.ceil(np.abs(end - start).max() / step)))
-        result += [
-            (number, (start + step_number / count * (end - start)).tolist()) for step_number in range(1, count + 1)
-        ]
+    """Returns states on the segments between points, each with the index of the segment's end point.
+
+    A segment is a cubic if its points have velocities, and a straight line otherwise, as for the controller.
+    """
+    points = trajectory.points
+    result = [(0, list(points[0].positions))]
+    for number, (start, end) in enumerate(pairwise(points), start=1):
+        move = np.subtract(end.positions, start.positions)
+        slopes, largest = (move, move), float(np.abs(move).max())  # changes per fraction of the segment
+        if start.velocities and end.velocities:
+            duration_s = (end.time_from_start - start.time_from_start).to_sec()
+            slopes = (duration_s * np.asarray(start.velocities), duration_s * np.asarray(end.velocities))
+            largest = float(np.abs([1.5 * move, *slopes]).max())
+        count = max(1, int(np.ceil(largest / step)))
+        for s in np.arange(1, count + 1) / count:
+            rise, leave, arrive = s * s * (3.0 - 2.0 * s), s * (1.0 - s) ** 2, s * s * (s - 1.0)
+            result.append((number, (start.positions + rise * move + leave * slopes[0] + arrive * slopes[1]).tolist()))
     return result
