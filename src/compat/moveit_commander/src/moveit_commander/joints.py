@@ -5,11 +5,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from modular_framework_urdf import robot as urdf_robot
-from modular_framework_urdf.joint_limits import described_limits, overwritten
+from modular_framework_urdf.joint_limits import (
+    DEFAULT_ACCELERATION,
+    DEFAULT_VELOCITY,
+    JointLimits,
+    described_limits,
+    overwritten,
+)
 from modular_framework_urdf.mimics import Mimic
 from modular_framework_urdf.robot import MOVABLE_KINDS, Vector
 from modular_framework_urdf.srdf_reader import VirtualJoint
@@ -93,24 +99,27 @@ def root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str
 
 
 def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
-    """Returns a variable of a virtual joint, with the bounds of joint_limits.yaml or else MoveIt's bounds."""
+    """Returns a variable of a virtual joint, with the limits of joint_limits.yaml or else MoveIt's limits."""
     variable = name.rpartition("/")[2]
     bound = math.pi if variable == "theta" else 1.0 if variable.startswith("rot_") else math.inf
-    part = Joint(
-        name,
-        "continuous" if variable == "theta" else "prismatic",
-        joint.parent_frame,
-        joint.child_link,
-        lower=-bound,
-        upper=bound,
-        neutral=1.0 if variable == QUATERNION_W else 0.0,
-    )
     joint_limits = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
     entry = limits.get(name) or (joint_limits.get(variable) if isinstance(joint_limits, Mapping) else None) or {}
-    if not entry.get("has_position_limits", False):
-        return part
-    lower, upper = float(entry.get("min_position", -bound)), float(entry.get("max_position", bound))
-    return replace(part, kind="prismatic", lower=lower, upper=upper)
+    default = JointLimits(-bound, bound, DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+    try:
+        found, _ = overwritten(name, default, entry)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RobotModelError(f"virtual joint '{joint.name}', entry in joint_limits.yaml: {error}") from error
+    return Joint(
+        name,
+        "continuous" if variable == "theta" and not entry.get("has_position_limits", False) else "prismatic",
+        joint.parent_frame,
+        joint.child_link,
+        lower=found.lower,
+        upper=found.upper,
+        velocity=found.velocity,
+        acceleration=found.acceleration,
+        neutral=1.0 if variable == QUATERNION_W else 0.0,
+    )
 
 
 def is_quaternion(variable: Joint) -> bool:

@@ -6,16 +6,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from numbers import Real
 
-import numpy as np
 import rospy
 from moveit_msgs.msg import RobotState, RobotTrajectory
-from trajectory_msgs.msg import JointTrajectoryPoint
 
 from moveit_commander.chain_jacobian import jacobian
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_objects import GroupObjects
 from moveit_commander.robot_model import group_values
-from moveit_commander.trajectory_timing import ALGORITHMS, Limits, distinct, retime, unwound
+from moveit_commander.trajectory_timing import ALGORITHMS
+from moveit_commander.trajectory_waypoints import retimed_trajectory
 
 
 class MoveGroupCommander(GroupObjects):
@@ -72,6 +71,8 @@ class MoveGroupCommander(GroupObjects):
     ) -> RobotTrajectory:
         """Returns the trajectory with the same waypoints but new times, velocities and accelerations.
 
+        The joints and a planar or floating base are timed together.
+
         Args:
             ref_state_in: State of the other joints, which is ignored.
             traj_in: Trajectory; repeated points are removed.
@@ -103,46 +104,9 @@ class MoveGroupCommander(GroupObjects):
                 ", ".join(ALGORITHMS),
             )
             return RobotTrajectory()
-        names = traj_in.joint_trajectory.joint_names
-        unknown = [name for name in names if name not in self._model.joints]
-        if unknown:
-            raise MoveItCommanderException(
-                f"retime_trajectory: unknown joints {unknown}; only joints of the robot are "
-                f"allowed: {', '.join(self._model.joints)}"
-            )
-        joints = [self._model.joints[name] for name in names]
-        points = [point.positions for point in traj_in.joint_trajectory.points]
-        for number, point in enumerate(points):
-            if len(point) != len(names) or not np.isfinite(point).all():
-                raise MoveItCommanderException(
-                    f"retime_trajectory: points[{number}] has positions {list(point)}; one finite number is needed "
-                    f"for each of the {len(names)} joints"
-                )
-        if points:
-            points = unwound(points, [joint.kind == "continuous" for joint in joints]).tolist()
-        timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
-        timed.joint_trajectory.header, timed.joint_trajectory.joint_names = traj_in.joint_trajectory.header, list(names)
-        kept = [points[index] for index in distinct(points)] if len(points) > 1 else points
-        if len(kept) < 2:
-            timed.joint_trajectory.points = [
-                _point(point, 0.0, [0.0] * len(names), [0.0] * len(names)) for point in kept
-            ]
-            return timed
-        lower, upper, velocity, acceleration = np.array(
-            [(joint.lower, joint.upper, joint.velocity, joint.acceleration) for joint in joints]
-        ).T
-        is_endless = [joint.kind == "continuous" for joint in joints]
-        limits = Limits(
-            np.where(is_endless, -np.inf, lower),
-            np.where(is_endless, np.inf, upper),
-            _factor("velocity", velocity_scaling_factor) * velocity,
-            _factor("acceleration", acceleration_scaling_factor) * acceleration,
-        )
-        timing = retime(kept, limits)
-        timed.joint_trajectory.points = [
-            _point(*row) for row in zip(kept, timing.times, timing.velocities, timing.accelerations, strict=True)
-        ]
-        return timed
+        velocity_factor = _factor("velocity", velocity_scaling_factor)
+        acceleration_factor = _factor("acceleration", acceleration_scaling_factor)
+        return retimed_trajectory(self._model, traj_in, velocity_factor, acceleration_factor)
 
 
 def _factor(kind: str, value: float) -> float:
@@ -151,14 +115,3 @@ def _factor(kind: str, value: float) -> float:
         return value
     rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed: 0 < factor <= 1; 1 is used", kind, value)
     return 1.0
-
-
-def _point(
-    positions: Sequence[float], time_s: float, velocities: Sequence[float], accelerations: Sequence[float]
-) -> JointTrajectoryPoint:
-    return JointTrajectoryPoint(
-        positions=list(positions),
-        velocities=[float(value) for value in velocities],
-        accelerations=[float(value) for value in accelerations],
-        time_from_start=rospy.Duration.from_sec(float(time_s)),
-    )
