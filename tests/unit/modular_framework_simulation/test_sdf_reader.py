@@ -82,7 +82,8 @@ def test_gravity_defaults_to_that_of_sdf_and_can_be_set(tmp_path: Path) -> None:
 
 def test_what_means_nothing_here_is_read_over_and_listed(tmp_path: Path) -> None:
     read = world(
-        tmp_path, "<light name='sun'/>\n<plugin name='x'/><physics><max_step_size>0.004</max_step_size></physics>"
+        tmp_path,
+        "<light name='sun' type='point'/>\n<plugin name='x'/><physics><max_step_size>0.004</max_step_size></physics>",
     )
     assert [entry.split(": ")[1] for entry in read.ignored] == ["<plugin>"]
     assert read.step_s == 0.004

@@ -38,7 +38,7 @@ def load_mesh(mesh: Mesh) -> TriangleMesh:
     try:
         return read_mesh(mesh.path, mesh.scale, mesh.submesh, mesh.center)
     except MeshError as error:
-        raise DescriptionError(f"mesh file {error.path}", error.found, error.allowed) from error
+        raise DescriptionError(mesh.place, error.found, error.allowed) from error
 
 
 def default_cache_folder() -> Path:
@@ -92,7 +92,7 @@ class ConvexParts:
         try:
             content = mesh.path.read_bytes()
         except OSError as error:
-            raise DescriptionError(str(mesh.path), f"cannot be read ({error})", "give a readable mesh file") from error
+            raise DescriptionError(mesh.place, f"cannot be read ({error})", "give a readable mesh file") from error
         key = hashlib.sha256(content)
         key.update(f"{mesh.scale}|{mesh.submesh}|{mesh.center}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
         folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
@@ -111,7 +111,9 @@ class ConvexParts:
             solid = trimesh.Trimesh(loaded.vertices, loaded.triangles)
             hull = solid.convex_hull
         except Exception as error:  # qhull reports flat point sets by its own exceptions
-            raise DescriptionError(str(mesh.path), f"has no convex hull ({error})", "expected a solid") from error
+            reason = str(error).strip().partition("\n")[0]
+            advice = "expected a solid; export the mesh again, or correct its <scale>"
+            raise DescriptionError(mesh.place, f"has no convex hull ({reason})", advice) from error
         volume_ratio = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
         if kind == "hull" or volume_ratio > _MIN_CONVEX_VOLUME_RATIO:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]

@@ -19,19 +19,23 @@ MODEL_FRAME = "__model__"
 _FRAME_TAGS = ("link", "frame")
 
 
+MAX_COORDINATE = 1e6
+"""Maximum magnitude of a number in a pose [m or rad]; beyond, positions are no longer precise to 1 um."""
+
+
 def pose_of(node: XmlNode) -> Pose:
     """Parses an element's text as a pose: x y z [m] roll pitch yaw [rad]; an empty text is the identity.
 
     The attributes `degrees` and `rotation_format` of SDF 1.9 are supported.
 
     Raises:
-        DescriptionError: The text has the wrong number of values.
+        DescriptionError: The text has the wrong number of values, or a value is too large.
     """
     if not node.text.strip():
         return Pose()
     rotation = node.attributes.get("rotation_format", "euler_rpy")
     if rotation == "quat_xyzw":
-        x, y, z, *quaternion = node.numbers(7)
+        x, y, z, *quaternion = _bounded_numbers(node, 7)
         qx, qy, qz, qw = quaternion
         try:
             return Pose((x, y, z), normalised_quaternion((qx, qy, qz, qw)))
@@ -40,10 +44,18 @@ def pose_of(node: XmlNode) -> Pose:
     if rotation != "euler_rpy":
         problem = f"got rotation_format '{rotation}'"
         raise DescriptionError(node.location, problem, "allowed: euler_rpy, quat_xyzw")
-    x, y, z, roll, pitch, yaw = node.numbers(6)
+    x, y, z, roll, pitch, yaw = _bounded_numbers(node, 6)
     if node.attributes.get("degrees", "false").strip().lower() in ("true", "1"):
         roll, pitch, yaw = math.radians(roll), math.radians(pitch), math.radians(yaw)
     return Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
+
+
+def _bounded_numbers(node: XmlNode, count: int) -> tuple[float, ...]:
+    values = node.numbers(count)
+    if max(map(abs, values)) > MAX_COORDINATE:
+        problem = f"got '{node.text.strip()}'"
+        raise DescriptionError(node.location, problem, f"allowed: numbers up to {MAX_COORDINATE:,.0f} in magnitude")
+    return values
 
 
 def base_of(pose: XmlNode) -> str:

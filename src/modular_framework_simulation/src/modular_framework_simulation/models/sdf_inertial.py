@@ -21,6 +21,9 @@ WATER_KG_PER_M3 = 1000.0
 """SDF's default density of shapes whose inertia is computed."""
 
 _DEFAULT_MASS_KG, _DEFAULT_MOMENT = 1.0, 1.0
+_MIN_MASS_KG, _MAX_MASS_KG = 1e-9, 1e9
+_MIN_MOMENT, _MAX_MOMENT = 1e-14, 1e12
+"""Range of principal moments that the engines compute [kg m^2]; a smaller moment counts as 0."""
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ROUNDING_TOLERANCE = 1e-3
 """Fraction by which rounded moments may violate the triangle inequality."""
@@ -38,7 +41,7 @@ def read_inertial(
         notes: Collector of notes on replaced values.
 
     Raises:
-        DescriptionError: The mass is not positive.
+        DescriptionError: The mass or a moment is out of range.
     """
     node = link.find("inertial")
     if node is None:
@@ -50,14 +53,19 @@ def read_inertial(
         return _computed_from_shapes(node, link, collisions)
     mass_node, inertia_node = node.find("mass"), node.find("inertia")
     mass = mass_node.number() if mass_node is not None else _DEFAULT_MASS_KG
-    if mass <= 0:
-        raise DescriptionError((mass_node or node).location, f"got mass {mass:g} kg", "allowed: greater than 0")
+    if not _MIN_MASS_KG <= mass <= _MAX_MASS_KG:
+        allowed = f"allowed: greater than 0, from {_MIN_MASS_KG:g} to {_MAX_MASS_KG:g} kg"
+        raise DescriptionError((mass_node or node).location, f"got mass {mass:g} kg", allowed)
 
     def moment(tag: str) -> float:
         child = inertia_node.find(tag) if inertia_node is not None else None
         return child.number() if child is not None else (_DEFAULT_MOMENT if tag[1] == tag[2] else 0.0)
 
     xx, xy, xz, yy, yz, zz = (moment(tag) for tag in _MOMENTS)
+    if max(map(abs, (xx, xy, xz, yy, yz, zz))) > _MAX_MOMENT:
+        largest = max((xx, xy, xz, yy, yz, zz), key=abs)
+        problem = f"has the moment {largest:g} kg m^2"
+        raise DescriptionError((inertia_node or node).location, problem, f"allowed: up to {_MAX_MOMENT:g} kg m^2")
     pose = frames.pose_in_link(link.name(), node.find("pose"))
     given = specs.Inertial(pose, mass, (xx, xy, xz, yy, yz, zz))
     return with_valid_inertia(given, collisions, inertia_node or node, notes)
@@ -76,7 +84,7 @@ def with_valid_inertia(
     """
     moments = principal_moments(inertial.inertia)
     problem = "the principal moments are {:g}, {:g}, {:g} kg m^2".format(*moments)
-    if moments[0] > 0:
+    if moments[0] >= _MIN_MOMENT:
         if is_impossible(moments, _ROUNDING_TOLERANCE):
             notes.add(node, f"{problem}; no rigid body has these moments, but they are used unchanged")
         return inertial

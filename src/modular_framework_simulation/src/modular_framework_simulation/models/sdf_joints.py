@@ -91,9 +91,9 @@ def _axis_in_joint(node: XmlNode, joint_in_model: Pose, frames: FrameTree, versi
     """Returns the unit vector of an axis in the joint frame."""
     xyz = node.find("xyz")
     x, y, z = xyz.numbers(3) if xyz is not None else (0.0, 0.0, 1.0)
-    length = math.sqrt(x * x + y * y + z * z)
-    if length < 1e-9:
-        raise DescriptionError((xyz or node).location, "got an axis of length 0", "expected a direction")
+    length = math.hypot(x, y, z)
+    if not 1e-9 <= length < math.inf:
+        raise DescriptionError((xyz or node).location, f"got an axis of length {length:g}", "expected a direction")
     axis = (x / length, y / length, z / length)
     axis_frame = _frame_of_axis(node, frames, version)
     if axis_frame is None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Collection
 from pathlib import Path
 
@@ -37,6 +38,11 @@ _UNIQUE_NAMES_FROM = (1, 7)
 
 READ_OR_APPEARANCE = ("gravity", "frame", "state", "physics", "light", "scene", "gui")
 """Elements of a world that are read, or determine only its appearance."""
+
+_LIGHTS = ("point", "directional", "spot")
+
+_MAX_GRAVITY = 1e4
+"""Maximum magnitude of the gravity [m/s^2]; the surface of the sun has 274."""
 
 _REFUSED_IN_WORLD = {
     "population": "place the models individually",
@@ -74,7 +80,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         world.attributes.get("name", path.stem),
         _gravity(world, version),
         tuple(with_saved_state(models, world.find("state"))),
-        tuple(ignored),
+        (*ignored, *_states_of_unknown_models(models, world.find("state"))),
         _step(world),
         (*unknown, *reader.unknown),
     )
@@ -98,10 +104,29 @@ def _models_of(world: XmlNode, version: tuple[int, ...], reader: SdfModels) -> t
                     child.location, f"is a second model '{model.spec.name}'", "give each model its own name"
                 )
             model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
+            if model.spec.name == specs.WORLD:
+                problem = "has the name of the world frame, so that no request can name the model"
+                ignored.append(f"{child.location} {problem}; give the model another name")
             loaded[model.spec.name] = model
+        elif child.tag == "light":
+            ignored += _light_faults(child)
         elif child.tag in children_of("world") and child.tag not in READ_OR_APPEARANCE:
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
     return loaded, ignored
+
+
+def _light_faults(light: XmlNode) -> list[str]:
+    """Returns the faults of a light; lights have no effect, so that a fault is not an error."""
+    kind, pose, faults = light.attributes.get("type", ""), light.find("pose"), []
+    if kind not in _LIGHTS:
+        faults.append(f"{light.location} has the type '{kind}' (allowed: {', '.join(_LIGHTS)})")
+    try:
+        light.name()
+        if pose is not None:
+            pose_of(pose)
+    except DescriptionError as error:
+        faults.append(str(error))
+    return faults
 
 
 def _with_free_name(model: LoadedModel, used_names: Collection[str], location: str) -> LoadedModel:
@@ -149,6 +174,8 @@ def _gravity(world: XmlNode, version: tuple[int, ...]) -> Vector3:
     if node is None:
         return STANDARD_GRAVITY
     x, y, z = node.numbers(3)
+    if math.hypot(x, y, z) > _MAX_GRAVITY:
+        raise DescriptionError(node.location, f"got '{node.text.strip()}'", f"allowed: up to {_MAX_GRAVITY:g} m/s^2")
     return (x, y, z)
 
 
@@ -174,6 +201,16 @@ def with_saved_state(models: list[specs.Model], state: XmlNode | None) -> list[s
             raise DescriptionError(change.location, "adds or removes models", "allowed: a saved world without changes")
     saved = {node.attributes.get("name", ""): node for node in state.find_all("model")}
     return [_restored_model(model, saved[model.name]) if model.name in saved else model for model in models]
+
+
+def _states_of_unknown_models(models: list[specs.Model], state: XmlNode | None) -> list[str]:
+    names = {model.name for model in models}
+    saved = state.find_all("model") if state is not None else []
+    return [
+        f"{node.location} of a model that the world does not have"
+        for node in saved
+        if node.attributes.get("name", "") not in names
+    ]
 
 
 def _restored_model(model: specs.Model, saved: XmlNode) -> specs.Model:

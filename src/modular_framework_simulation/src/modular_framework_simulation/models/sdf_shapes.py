@@ -14,7 +14,7 @@ from modular_framework_simulation.models.sdf_frames import FrameTree
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_surface import read_bounce, read_friction, read_surface_contact
-from modular_framework_simulation.models.visual_meshes import missing_images
+from modular_framework_simulation.models.visual_meshes import image_fault, image_faults
 from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
@@ -79,10 +79,10 @@ def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) 
         return []
     material = _read_material(node, reading)
     for shape in (shape for _, shape in shapes if isinstance(shape, specs.Mesh) and material is None):
-        for image in missing_images(shape.path):
-            reading.notes.add(
-                node, f"the image '{image}' of {shape.path.name} does not exist; drawn without a texture", image
-            )
+        for image, fault in image_faults(shape.path).items():
+            noun = "material library" if image.endswith(".mtl") else "image"
+            line = f"the {noun} '{image}' of {shape.path.name} {fault}; drawn without a texture"
+            reading.notes.add(node, line, image)
     transparency = node.find("transparency")
     look = material or Material()
     red, green, blue, alpha = look.colour
@@ -117,6 +117,9 @@ def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
             named = Material()
         if named.missing_texture:
             reading.notes.add(script, f"the image '{named.missing_texture}' does not exist; drawn in a plain colour")
+        elif named.texture is not None and (fault := image_fault(named.texture)):
+            reading.notes.add(script, f"the image '{named.texture}' {fault}; drawn in a plain colour")
+            named = Material(named.colour)
     if colour_node is None:
         return named
     red, green, blue, *alpha = colour_node.number_list(3, 4)
@@ -184,10 +187,10 @@ def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
         raise DescriptionError(scale.location, f"got '{scale.text.strip()}'", "allowed: numbers different from 0")
     submesh = node.find("submesh")
     if submesh is None:
-        return specs.Mesh(path, (x, y, z))
+        return specs.Mesh(path, (x, y, z), location=node.location)
     center = submesh.find("center")
     name = submesh.require("name").text.strip()
-    return specs.Mesh(path, (x, y, z), name, center.flag() if center is not None else False)
+    return specs.Mesh(path, (x, y, z), name, center.flag() if center is not None else False, node.location)
 
 
 def _positive(node: XmlNode, count: int) -> tuple[float, ...]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from enum import Enum
 from pathlib import Path
 
@@ -50,12 +50,19 @@ class Mesh:
         scale: Scale factors along x, y, z.
         submesh: Name of the only node to use; empty for all nodes.
         center: Whether the submesh is moved so that its bounding box is centred on the origin.
+        location: File, line and element that name the mesh, for error messages.
     """
 
     path: Path
     scale: Vector3 = (1.0, 1.0, 1.0)
     submesh: str = ""
     center: bool = False
+    location: str = field(default="", compare=False, repr=False)
+
+    @property
+    def place(self) -> str:
+        """Returns the mesh file and the element that names the mesh, for the start of an error message."""
+        return f"{self.location}: mesh file {self.path}" if self.location else f"mesh file {self.path}"
 
 
 class JointType(Enum):

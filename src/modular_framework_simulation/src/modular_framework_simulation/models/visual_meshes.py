@@ -130,15 +130,35 @@ def find_image(mesh: Path, name: str) -> Path | None:
     return None
 
 
-def missing_images(mesh: Path) -> list[str]:
-    """Returns the names of missing images of a COLLADA file."""
-    if mesh.suffix.lower() != ".dae":
-        return []
+def image_faults(mesh: Path) -> dict[str, str]:
+    """Returns the faults of the images and material libraries of a COLLADA or OBJ file, by the name in the file."""
+    names, kind = [], mesh.suffix.lower()
     try:
-        names = [name.decode(errors="replace") for name in _COLLADA_IMAGE.findall(mesh.read_bytes())]
+        content = mesh.read_bytes() if kind in (".dae", ".obj") else b""
+        if kind == ".dae":
+            names = _COLLADA_IMAGE.findall(content)
+        elif kind == ".obj":
+            names = [second for _, second in _REFERENCED_FILE.findall(content) if second]
+            libraries = [library for name in names if (library := find_image(mesh, name.decode(errors="replace")))]
+            names += [second for each in libraries for _, second in _REFERENCED_FILE.findall(each.read_bytes())]
     except OSError:
-        return []
-    return [name for name in dict.fromkeys(names) if find_image(mesh, name) is None]
+        return {}
+    found = {name: find_image(mesh, name) for name in dict.fromkeys(each.decode(errors="replace") for each in names)}
+    faults = {name: image_fault(file) for name, file in found.items() if file is None or file.suffix != ".mtl"}
+    return {name: fault for name, fault in faults.items() if fault}
+
+
+def image_fault(file: Path | None) -> str:
+    """Returns the fault of an image file, "" for a readable image; None stands for a missing file."""
+    from PIL import Image
+
+    if file is None:
+        return "does not exist"
+    try:
+        with Image.open(file):
+            return ""
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        return f"is not a readable image ({type(error).__name__})"
 
 
 class _MeshFiles:
@@ -192,7 +212,7 @@ def _open(path: Path) -> Any:
     try:
         with Image.open(path) as image:
             return image.convert("RGB")
-    except (OSError, ValueError):
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return None
 
 

@@ -159,7 +159,8 @@ def _geometry_from(record: Mapping[str, Any]) -> specs.Geometry:
             return specs.Plane(_vector(record["normal"]), (width, height))
         case "mesh":
             scale = _vector(record["scale"])
-            return specs.Mesh(Path(record["path"]), scale, str(record["submesh"]), bool(record["center"]))
+            part, location = str(record["submesh"]), str(record.get("location", ""))
+            return specs.Mesh(Path(record["path"]), scale, part, bool(record["center"]), location)
         case shape:
             raise ValueError(f"unknown shape '{shape}'; allowed: box, cylinder, sphere, plane, mesh")
 
