@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pytest
@@ -13,8 +14,9 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics import pybullet_rest
-from modular_framework_simulation.physics.applied_forces import Interval, LinkWrench
-from modular_framework_simulation.physics.model_changes import JointChange, set_joint
+from modular_framework_simulation.physics.applied_forces import Interval, JointEffort, LinkWrench
+from modular_framework_simulation.physics.body_joints import measured_joint
+from modular_framework_simulation.physics.model_changes import JointChange, set_joint, set_joint_positions
 from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -30,6 +32,21 @@ WHEEL = """<sdf version='1.6'><model name='wheel'><pose>5 0 1 0 0 0</pose><link 
   <inertial><mass>1</mass><inertia><ixx>.01</ixx><iyy>.01</iyy><izz>.01</izz></inertia></inertial></link>
   <joint name='axle' type='revolute'><parent>world</parent><child>disc</child><axis><xyz>0 0 1</xyz></axis></joint>
   </model></sdf>"""
+
+CHEST = """<sdf version='1.6'><model name='chest'><pose>0 2 0.05 0 0 0</pose>
+  <link name='box'><inertial><mass>1</mass><inertia><ixx>.002</ixx><iyy>.002</iyy><izz>.002</izz></inertia></inertial>
+    <collision name='c'><geometry><box><size>.2 .2 .1</size></box></geometry></collision></link>
+  <link name='lid'><pose>0 0 0.056 0 0 0</pose>
+    <inertial><mass>.1</mass><inertia><ixx>3e-4</ixx><iyy>3e-4</iyy><izz>6e-4</izz></inertia></inertial>
+    <collision name='c'><geometry><box><size>.2 .2 .01</size></box></geometry></collision></link>
+  <link name='lock'><pose>0.11 0 0 0 0 0</pose>
+    <inertial><mass>.1</mass><inertia><ixx>1e-4</ixx><iyy>1e-4</iyy><izz>1e-4</izz></inertia></inertial>
+    <collision name='c'><geometry><box><size>.02 .02 .02</size></box></geometry></collision></link>
+  <joint name='bolt' type='fixed'><parent>box</parent><child>lock</child></joint>
+  <joint name='hinge' type='revolute'><pose>-.1 0 0 0 0 0</pose><parent>box</parent><child>lid</child>
+    <axis><xyz>0 -1 0</xyz><limit><lower>0</lower><upper>2</upper></limit><dynamics><friction>.3</friction></dynamics>
+    </axis></joint></model></sdf>"""
+HINGE = PartName("chest", "hinge")
 
 MakeWorld = Callable[..., PhysicsWorld]
 
@@ -67,7 +84,7 @@ def stored(make_world: MakeWorld) -> PhysicsWorld:
     """A furnished world whose cubes are not in the engine."""
     world = make_world()
     furnish(world)
-    assert bodies_in_engine(world) == 3  # floor, table and wheel
+    assert bodies_in_engine(world) == 2  # floor and wheel
     return world
 
 
@@ -187,8 +204,95 @@ def test_the_record_of_the_world_keeps_the_contacts_of_stored_bodies_and_leaves_
     for _ in range(round(LONG_S / 0.02)):
         run(world, 0.02)
         record.sample()
-    assert bodies_in_engine(world) == 3
+    assert bodies_in_engine(world) == 2
     samples = record.stop()["samples"]
     contacts = [sample[2] for sample in samples if sample[2] is not None][-1]
     assert {("cube", "table"), ("cube", "upper")} <= set(contacts)
-    assert bodies_in_engine(world) == 3
+    assert bodies_in_engine(world) == 2
+
+
+@pytest.fixture
+def chest(make_world: MakeWorld) -> PhysicsWorld:
+    """A world with a stored chest, whose lid is held open by the friction of its hinge, and a wheel that turns."""
+    world = make_world()
+    world.spawn(read_model_text(CHEST, "text", Resources()))
+    world.spawn(read_model_text(WHEEL, "text", Resources()))
+    set_joint(world, PartName("wheel", "axle"), JointChange(None, None, JointSettings(None, 1.0, 5.0)))
+    set_joint_positions(world, "chest", {"hinge": 1.0})
+    run(world, LONG_S)
+    assert bodies_in_engine(world) == 2  # floor and wheel
+    return world
+
+
+def lid(world: PhysicsWorld) -> float:
+    return measured_joint(world.engine, world.body("chest"), "hinge").position
+
+
+def test_links_and_joints_of_a_stored_model_are_read_without_loading_the_model(chest: PhysicsWorld) -> None:
+    body = chest.body("chest")
+    index = body.joint_indices["hinge"]
+    assert chest.engine.joint_states(body.number, [index])[0].position == pytest.approx(1.0, abs=0.01)
+    in_chest = chest.state_relative_to("chest::lid", "chest").pose.position
+    across, up = 0.1 * math.cos(1.0) - 0.1, 0.056 + 0.1 * math.sin(1.0)
+    assert in_chest == pytest.approx((across, 0.0, up), abs=2e-3)
+    assert chest.entity_state("chest::lock").twist == Twist()
+    assert chest.moving() == {"wheel"}
+    assert bodies_in_engine(chest) == 2
+
+
+def test_a_stored_model_that_is_hit_keeps_its_joints_and_their_friction(chest: PhysicsWorld) -> None:
+    chest.spawn(solid("ball", specs.Sphere(0.04), Pose((-0.8, 2, 0.05)), mass=1.0))
+    chest.set_state("ball", BodyState(Pose((-0.8, 2, 0.05)), Twist((3.0, 0, 0))))
+    run(chest, 0.3)
+    assert chest.entity_state("chest").twist.linear[0] > 0.3 or chest.entity_state("chest").pose.position[0] > 0.02
+    run(chest, 2.0)
+    assert lid(chest) == pytest.approx(1.0, abs=0.3)
+    assert chest.entity_state("chest").pose.position[2] == pytest.approx(0.05, abs=2e-3)
+
+
+def test_an_effort_moves_the_joint_of_a_stored_model(chest: PhysicsWorld) -> None:
+    begin = chest.time_ns
+    chest.forces.add_effort(JointEffort(HINGE, 0.6, Interval(begin, begin + 200_000_000)))
+    run(chest, 0.2)
+    assert lid(chest) > 1.3
+
+
+def test_a_joint_of_a_stored_model_that_is_set_stays_there(chest: PhysicsWorld) -> None:
+    set_joint_positions(chest, "chest", {"hinge": 0.4})
+    run(chest, 0.5)
+    assert lid(chest) == pytest.approx(0.4, abs=0.01)
+
+
+def test_a_model_with_joints_sleeps_beside_moving_bodies(
+    make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()
+    world = make_world()
+    world.spawn(read_model_text(CHEST, "text", Resources()))
+    world.spawn(solid("cube", CUBE, Pose((0, 2, 0.1361)), mass=MASS_KG))  # on the lid
+    world.spawn(read_model_text(WHEEL, "text", Resources()))
+    set_joint(world, PartName("wheel", "axle"), JointChange(None, None, JointSettings(None, 1.0, 5.0)))
+    run(world, LONG_S + 1.0)
+    assert world.moving() == {"wheel"}
+    assert world.entity_state("cube").pose.position[2] == pytest.approx(0.136, abs=2e-3)
+
+
+def test_a_stored_static_model_stops_a_body_that_falls_on_it(stored: PhysicsWorld) -> None:
+    stored.spawn(solid("ball", specs.Sphere(0.05), Pose((0.3, 0, 2.0)), mass=2.0))
+    run(stored, 2.0)
+    assert stored.entity_state("ball").pose.position[2] == pytest.approx(0.6, abs=5e-3)
+
+
+def test_stored_static_models_of_a_world_without_other_models_are_deleted_and_moved(make_world: MakeWorld) -> None:
+    world = make_world()
+    for name, y in (("table", 0.0), ("shelf", 3.0)):
+        world.spawn(solid(name, CUBE, Pose((0, y, 0.5)), static=True))
+    run(world, 0.3)
+    assert bodies_in_engine(world) == 0
+    world.delete("table")
+    world.set_state("shelf", BodyState(Pose((0, 0, 1.0)), Twist()))
+    run(world, 0.3)
+    assert world.names() == ["floor", "shelf"]
+    world.spawn(solid("cube", CUBE, Pose((0, 0, 1.1))))
+    run(world, 1.0)
+    assert height(world, "cube") == pytest.approx(1.05, abs=2e-3)

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any
 
 import rospy
 from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from modular_framework_simulation.gazebo_ros import conversions, ros_names
+from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.gazebo_ros.packed_states import PackedLinkStates, PackedModelStates, PackedStates
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState
@@ -85,6 +85,9 @@ class WorldTopics:
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
         self._performance = rospy.Publisher(ros_names.PERFORMANCE_METRICS, PerformanceMetrics, queue_size=10)
+        self._model_states, self._link_states = PackedModelStates(), PackedLinkStates()
+        self._model_states.packed = PackedStates(world, lambda name: [(name, world.body(name).state())])
+        self._link_states.packed = PackedStates(world, self._states_of_links)
         self._last_measurement = (time.monotonic(), world.time_ns)
         self._last_grasped: str | None = None
         self.publish_grasped(())
@@ -92,16 +95,18 @@ class WorldTopics:
     def publish_models(self) -> None:
         """Publishes the states of all models, if there is a subscriber."""
         if self._models.get_num_connections():
-            states = [(name, self._world.body(name).state()) for name in self._world.names()]
-            self._models.publish(_with_states(ModelStates(), states))
+            self._model_states.packed.update()
+            self._models.publish(self._model_states)
 
     def publish_links(self) -> None:
         """Publishes the states of all links, if there is a subscriber."""
         if self._links.get_num_connections():
-            bodies = [(name, self._world.body(name)) for name in self._world.names()]
-            links = [(name, body, link) for name, body in bodies for link in body.link_names()]
-            states = [(f"{name}{SCOPE}{link}", body.link_state(link)) for name, body, link in links]
-            self._links.publish(_with_states(LinkStates(), states))
+            self._link_states.packed.update()
+            self._links.publish(self._link_states)
+
+    def _states_of_links(self, name: str) -> list[tuple[str, BodyState]]:
+        body = self._world.body(name)
+        return [(f"{name}{SCOPE}{link}", body.link_state(link)) for link in body.link_names()]
 
     def publish_performance(self) -> None:
         """Publishes the real-time factor since the last call; publishes nothing after a reset of time."""
@@ -119,10 +124,3 @@ class WorldTopics:
         if text != self._last_grasped:
             self._last_grasped = text
             self._grasped.publish(String(text))
-
-
-def _with_states(message: Any, states: list[tuple[str, BodyState]]) -> Any:
-    message.name = [name for name, _ in states]
-    message.pose = [conversions.pose_to_msg(state.pose) for _, state in states]
-    message.twist = [conversions.twist_to_msg(state.twist) for _, state in states]
-    return message

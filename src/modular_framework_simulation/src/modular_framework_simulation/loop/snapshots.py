@@ -7,10 +7,7 @@ from dataclasses import dataclass
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.physics.physics_engine import REST_LOOK_S
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-
-_MAX_AGE_NS = round(REST_LOOK_S * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +82,9 @@ def take_snapshot(
         previous: Last snapshot; if recent, the states of sleeping models are copied from this snapshot. None copies the
             current state of every model.
     """
-    if (
-        previous is not None
-        and previous.revision == world.revision
-        and 0 <= world.time_ns - previous.time_ns <= _MAX_AGE_NS
-    ):
-        moving = world.moving()
-        models = tuple(_copy(world, model.name) if model.name in moving else model for model in previous.models)
+    if previous is not None and previous.revision == world.revision:
+        moved = world.moved_since(previous.time_ns, previous.revision)
+        models = tuple(_copy(world, model.name) if model.name in moved else model for model in previous.models)
     else:
         models = tuple(_copy(world, name) for name, body in world.bodies.items() if body.spec is not None)
     return WorldSnapshot(world.time_ns * 1e-9, models, held, world.time_ns, world.revision)

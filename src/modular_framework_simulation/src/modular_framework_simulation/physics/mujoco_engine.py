@@ -72,6 +72,12 @@ class _Body:
     ids: list[int] = field(default_factory=list)
     spans: list[_Span] = field(default_factory=list)
 
+    @property
+    def is_static(self) -> bool:
+        """Whether no link of the body can move."""
+        joints = (link.joint for link in self.tree.links if link.joint is not None)
+        return self.tree.fixed and all(joint.kind is JointKind.FIXED for joint in joints)
+
 
 @dataclass(frozen=True, slots=True)
 class _Weld:
@@ -119,6 +125,7 @@ class MujocoEngine(PhysicsEngine):
         self._welds: dict[int, _Weld] = {}
         self._dynamics = MujocoDynamics(mujoco.MjSpec().compile(), settings, gravity)
         self._body_id_of = np.full(1, -1)
+        self._static: frozenset[int] = frozenset()
 
     def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
         """Changes settings and gravity [m/s^2]."""
@@ -136,8 +143,12 @@ class MujocoEngine(PhysicsEngine):
         self._dynamics.step()
 
     def resting(self) -> Collection[int]:
-        """Returns no bodies, because MuJoCo computes all bodies in every step."""
-        return ()
+        """Returns the static bodies; MuJoCo computes all movable bodies in every step."""
+        return self._static
+
+    def motionless(self) -> Collection[int]:
+        """Returns the static bodies."""
+        return self._static
 
     def close(self) -> None:
         """Does nothing, because Python frees MuJoCo's memory with this object."""
@@ -182,6 +193,7 @@ class MujocoEngine(PhysicsEngine):
             body.ids, body.spans = ids, spans
             self._body_id_of[ids] = number
         self._dynamics, self._bodies = new, bodies
+        self._static = frozenset(number for number, body in bodies.items() if body.is_static)
         for body in bodies.values():
             for index, surface in body.surfaces.items():
                 self._write_surface(body, index, surface)

@@ -200,7 +200,11 @@ class PhysicsEngine(ABC):
 
     @abstractmethod
     def resting(self) -> Collection[int]:
-        """Returns the sleeping bodies; motion of a sleeping body is detected within REST_LOOK_S."""
+        """Returns the static and sleeping bodies; motion of a sleeping body is detected within REST_LOOK_S."""
+
+    @abstractmethod
+    def motionless(self) -> Collection[int]:
+        """Returns the bodies that cannot have moved in the last step, without delay: a subset of `resting`."""
 
     @abstractmethod
     def save_state(self) -> Any:

@@ -45,11 +45,11 @@ class PhysicsSettings:
             coefficient of its two surfaces.
         pad_spinning_friction: Resistance of gripper links against spinning [m]; soft pads touch over an area.
         pad_rolling_friction: Resistance of gripper links against rolling [m].
-        rest_speed: Maximum velocity of sleeping objects [m/s, rad/s]. An object without joints that was slower for two
-            seconds is not computed until a moving body touches it, a force acts on it, or a request changes the world;
-            0 disables sleeping. Most objects of a world are at rest, and each costs 15 us per step. The solver leaves
-            objects at rest with up to 0.002 rad/s; a starting slip exceeds the value within two seconds, if ever. Only
-            PyBullet supports sleeping objects.
+        rest_speed: Maximum velocity of sleeping objects and their joints [m/s, rad/s]. An object that was slower for
+            two seconds is not computed until a moving body touches it, a force acts on it, or a request changes the
+            world; 0 disables sleeping. Most objects of a world are at rest, and each costs 15 us per step. The solver
+            leaves objects at rest with up to 0.002 rad/s; a starting slip exceeds the value within two seconds, if
+            ever. Only PyBullet supports sleeping objects.
     """
 
     time_step_ns: int = 2_000_000

@@ -33,6 +33,7 @@ from modular_framework_urdf.rotations import Vector3
 
 WORLD_FRAMES = ("", "world", "map", "/map")
 """Names of the world frame in requests."""
+_REST_LOOK_NS = round(REST_LOOK_S * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,11 +201,28 @@ class PhysicsWorld:
         self.revision += 1
         self.rest.disturb()
 
-    def moving(self) -> set[str]:
-        """Returns the names of the models that may have moved within the last REST_LOOK_S."""
+    def moving(self, woken: bool = False) -> set[str]:
+        """Returns the names of the models that may have moved within the last REST_LOOK_S.
+
+        Args:
+            woken: Whether to include sleeping models that may have been woken within this time.
+        """
         if (self._steps - self._last_computed_step) * self.settings.time_step_s > REST_LOOK_S:
             return set()
-        return {self._names_by_body_id[number] for number in self._names_by_body_id.keys() - self.engine.resting()}
+        still = self.engine.motionless() if woken else self.engine.resting()
+        return {self._names_by_body_id[number] for number in self._names_by_body_id.keys() - still}
+
+    def moved_since(self, time_ns: int, revision: int, woken: bool = False) -> set[str]:
+        """Returns the names of the models that may have moved since an earlier look at the world.
+
+        Args:
+            time_ns: Simulated time of the earlier look [ns]; after more than REST_LOOK_S, all models may have moved.
+            revision: Revision of the world at the earlier look.
+            woken: Whether to include sleeping models that may have been woken within REST_LOOK_S.
+        """
+        if revision == self.revision and 0 <= self._time_ns - time_ns <= _REST_LOOK_NS:
+            return self.moving(woken)
+        return set(self._bodies)
 
     @property
     def bodies(self) -> Mapping[str, SimulatedBody]:

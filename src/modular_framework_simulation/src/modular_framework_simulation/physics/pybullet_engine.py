@@ -10,7 +10,7 @@ import contextlib
 import math
 import os
 import tempfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ from modular_framework_simulation.physics.physics_engine import (
 )
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.pybullet_rest import SleepingBodies
-from modular_framework_simulation.physics.pybullet_store import BodyStore
+from modular_framework_simulation.physics.pybullet_store import BodyStore, link_motion
 from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_simulation.physics.surfaces import softness_of
 from modular_framework_urdf import xml_text
@@ -52,6 +52,9 @@ _ITERATIONS_PER_RATIO, _MAX_ITERATIONS = 2.0, 2000
 
 _MAX_VELOCITY = 1e3
 """Maximum velocity of bodies [m/s, rad/s]; the engine's default of 100 slows fast rotations down."""
+
+_CONCAVE = 'concave="yes"'
+"""Mark of a mesh that is kept exactly; the engine takes too long to load it again during the simulation."""
 
 _WELD_FORCE = 1e5
 """Maximum force and torque of a weld [N, Nm], practically unlimited."""
@@ -191,7 +194,7 @@ class PyBulletEngine(PhysicsEngine):
         self._configure(gravity)
 
     def _forget_bodies(self) -> None:
-        self._store = BodyStore(self.api, self.client, lambda text: self._load_text(text, False, 0))
+        self._store = BodyStore(self.api, self.client, lambda text, fixed: self._load_text(text, fixed, 0))
         self._rest = SleepingBodies(self.api, self.client, self.settings, self._store)
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
@@ -206,12 +209,13 @@ class PyBulletEngine(PhysicsEngine):
             raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
         self._set_dropped_moments(body, text)
         infos = self.joint_infos(body)
-        has_joints = any(info[2] != self.api.JOINT_FIXED for info in infos)
-        self._rest.add(body, fixed, has_joints)
-        if not (fixed or infos or self.has_window or body in self._impossible_moments):
-            self._store.keep_text(body, text)
+        joints = [info[0] for info in infos if info[2] != self.api.JOINT_FIXED]
+        is_robot = self_collision
+        if not (is_robot or self.has_window or body in self._impossible_moments or _CONCAVE in text):
+            self._store.keep_recipe(body, text, fixed, joints)
+        self._rest.add(body, fixed, joints, is_robot)
         mass: float = self.api.getDynamicsInfo(self._id(body), BASE_INDEX, physicsClientId=self.client)[0]
-        if not fixed and not has_joints and mass > 0.0:
+        if not fixed and not joints and mass > 0.0:
             self._free_masses[body] = mass
             self._iterations_fit = False
         return body
@@ -275,6 +279,10 @@ class PyBulletEngine(PhysicsEngine):
         """Returns the sleeping bodies."""
         return self._rest.bodies_at_rest
 
+    def motionless(self) -> Collection[int]:
+        """Returns the static bodies and the stored bodies."""
+        return self._rest.motionless_bodies
+
     def save_state(self) -> int:
         """Saves the state, contacts and caches in the engine.
 
@@ -299,9 +307,10 @@ class PyBulletEngine(PhysicsEngine):
     def remove_body(self, number: int) -> None:
         """Removes a body."""
         self._rest.wake_touching(number)
+        body = self._id(number)
         self._rest.remove(number)
         self._impossible_moments.pop(number, None)
-        self.api.removeBody(self._id(number), physicsClientId=self.client)
+        self.api.removeBody(body, physicsClientId=self.client)
         self._store.remove(number)
         if self._free_masses.pop(number, None) is not None:
             self._iterations_fit = False
@@ -404,19 +413,19 @@ class PyBulletEngine(PhysicsEngine):
         self._set_dynamics(number, BASE_INDEX, linearDamping=0.0, angularDamping=0.0, maxJointVelocity=_MAX_VELOCITY)
 
     def _set_dynamics(self, number: int, index: int, **options: Any) -> None:
-        self._store.note(number, options)
+        self._store.note_options(number, index, options)
         self.api.changeDynamics(self._id(number), index, **options, physicsClientId=self.client)
 
     def base_centre(self, number: int) -> Pose:
         """Returns the pose of the root link's centre of mass."""
-        stored = self._store.stored_poses.get(number)
+        stored = self._store.stored.get(number)
         if stored is not None:
-            return stored
+            return stored.centre
         return Pose(*self.api.getBasePositionAndOrientation(self._id(number), physicsClientId=self.client))
 
     def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
         """Returns linear and angular velocity of the root link's centre of mass."""
-        if number in self._store.stored_poses:
+        if number in self._store.stored:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         linear, angular = self.api.getBaseVelocity(self._id(number), physicsClientId=self.client)
         return linear, angular
@@ -440,8 +449,10 @@ class PyBulletEngine(PhysicsEngine):
 
     def link_motion(self, number: int, index: int) -> LinkMotion:
         """Returns pose and velocity of a link."""
-        record = self.api.getLinkState(self._id(number), index, 1, 1, physicsClientId=self.client)
-        return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])
+        stored = self._store.stored.get(number)
+        if stored is not None:
+            return stored.links[index]
+        return link_motion(self.api.getLinkState(self._id(number), index, 1, 1, physicsClientId=self.client))
 
     def weld(self, number: int, index: int, other: int) -> int:
         """Welds a body to a link; see `PhysicsEngine`."""
@@ -485,7 +496,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def touched_bodies(self, number: int) -> set[int]:
         """Returns the bodies that a body presses on; none for a stored body."""
-        if number in self._store.stored_poses:
+        if number in self._store.stored:
             return set()
         points = self.api.getContactPoints(bodyA=self._id(number), physicsClientId=self.client)
         return {self._store.number(point[2]) for point in points if point[9] > 0.0} - {number}
@@ -505,35 +516,57 @@ class PyBulletEngine(PhysicsEngine):
 
     def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
         """Returns the states of joints."""
+        stored = self._store.stored.get(number)
+        if stored is not None:
+            return [JointState(stored.joints[index][0], 0.0, 0.0) for index in indices]
         records = self.api.getJointStates(self._id(number), indices, physicsClientId=self.client)
         return [JointState(record[0], record[1], record[3]) for record in records]
 
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
         """Sets position and velocity of a joint."""
         self._rest.wake_touching(number)
-        self.api.resetJointState(self._id(number), index, position, velocity, physicsClientId=self.client)
+
+        def set_state() -> None:
+            self.api.resetJointState(self._id(number), index, position, velocity, physicsClientId=self.client)
+
+        self._rest.disturb(number, set_state)
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
         """Returns rotation and angular velocity of a ball joint."""
+        stored = self._store.stored.get(number)
+        if stored is not None:
+            x, y, z, w = stored.joints[index]
+            return (x, y, z, w), (0.0, 0.0, 0.0)
         rotation, rate = self.api.getJointStateMultiDof(self._id(number), index, physicsClientId=self.client)[:2]
         return rotation, rate
 
     def set_ball_joint_state(self, number: int, index: int, rotation: Quaternion, rate: Vector3) -> None:
         """Sets rotation and angular velocity of a ball joint."""
+        self._rest.wake(number)
         self.api.resetJointStateMultiDof(self._id(number), index, rotation, rate, physicsClientId=self.client)
 
     def release_ball_joint(self, number: int, index: int) -> None:
         """Removes the engine's default motor of a ball joint."""
-        self.api.setJointMotorControlMultiDof(
-            self._id(number),
-            index,
-            self.api.POSITION_CONTROL,
-            targetPosition=[0.0, 0.0, 0.0, 1.0],
-            positionGain=0.0,
-            velocityGain=0.0,
-            force=[0.0, 0.0, 0.0],
-            physicsClientId=self.client,
-        )
+
+        def release() -> None:
+            self.api.setJointMotorControlMultiDof(
+                self._id(number),
+                index,
+                self.api.POSITION_CONTROL,
+                targetPosition=[0.0, 0.0, 0.0, 1.0],
+                positionGain=0.0,
+                velocityGain=0.0,
+                force=[0.0, 0.0, 0.0],
+                physicsClientId=self.client,
+            )
+
+        self._set_motor(number, index, release)
+
+    def _set_motor(self, number: int, index: int, setting: Callable[[], None]) -> None:
+        """Applies the setting of a joint motor, which also applies after the body was stored."""
+        self._rest.wake(number)
+        self._store.note_motor(number, index, setting)
+        setting()
 
     def set_joint_damping(self, number: int, index: int, damping: float) -> None:
         """Sets the viscous damping of a joint."""
@@ -564,21 +597,29 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
         """Sets a motor that moves a joint at a velocity."""
-        self.api.setJointMotorControl2(
-            self._id(number),
-            index,
-            self.api.VELOCITY_CONTROL,
-            targetVelocity=velocity,
-            velocityGain=1.0,
-            force=effort,
-            physicsClientId=self.client,
-        )
+
+        def set_velocity() -> None:
+            self.api.setJointMotorControl2(
+                self._id(number),
+                index,
+                self.api.VELOCITY_CONTROL,
+                targetVelocity=velocity,
+                velocityGain=1.0,
+                force=effort,
+                physicsClientId=self.client,
+            )
+
+        self._set_motor(number, index, set_velocity)
 
     def apply_effort(self, number: int, index: int, effort: float) -> None:
         """Applies an effort to a joint in the next step."""
-        self.api.setJointMotorControl2(
-            self._id(number), index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
-        )
+
+        def apply() -> None:
+            self.api.setJointMotorControl2(
+                self._id(number), index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
+            )
+
+        self._rest.disturb(number, apply)
 
     def measure_joint_load(self, number: int, index: int) -> None:
         """Enables the measurement of the load on a joint."""

@@ -5,22 +5,23 @@ The engine puts a body to sleep that was slow for two seconds, and wakes the bod
 module handles the events that the engine does not detect:
 
 - A body that a hand has held at rest would keep sleeping in the air after the hand opens, because its velocity is still
-  0 when the contact ends. Therefore all bodies in contact with a body with joints are woken periodically.
+  0 when the contact ends. Therefore all bodies in contact with a robot, or with joints that moved, are woken
+  periodically.
 - If a request moves or removes a body, `wake_touching` wakes the bodies in contact with it. If a static body is placed,
   `wake_near` wakes the bodies at this place. A change of gravity wakes all bodies (`wake_all`).
 - A body wakes at the end of a step. A velocity or force of this step is lost and is therefore applied again afterwards.
-- A joint load of a sleeping body would read 0, so a body with a measured joint load never sleeps.
+- A joint load of a sleeping body would read 0, so a body with a measured joint load never sleeps. A robot never sleeps.
 
 Static bodies always sleep; otherwise the engine would compute their contacts with all resting bodies.
 
 If many bodies sleep, the bodies far from all moving bodies are stored outside of the engine (`pybullet_store`), because
 they would fill the processor's caches in every step. A stored body comes back when a moving body approaches it, or a
-body that touches it, and when a request concerns it.
+movable body that touches it, and when a request concerns it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,9 @@ from modular_framework_simulation.physics.pybullet_store import BodyStore, Boxes
 _REST_AFTER_S = 2.0
 """Time at low speed after which the engine puts a body to sleep; fixed in the engine [s]."""
 _WAKE_PERIOD_S = 0.5
-"""Period for waking the bodies in contact with bodies with joints [s of simulated time]."""
+"""Period for waking the bodies in contact with robots and moved joints [s of simulated time]."""
+_MOVED = 1e-4
+"""Motion of a joint or of its model in this period above which the bodies in contact are woken [m or rad]."""
 MAX_ASLEEP = 100
 """Number of sleeping bodies in the engine above which bodies are stored; fewer bodies cost at most 0.1 ms per step."""
 _APPROACH_STEPS = 5
@@ -43,7 +46,7 @@ twice this distance a body is stored."""
 
 
 class SleepingBodies:
-    """Sleeping bodies of a connection to the engine. Movable bodies without joints and static bodies can sleep.
+    """Sleeping bodies of a connection to the engine. All bodies except robots can sleep.
 
     Args:
         api: Module pybullet.
@@ -55,14 +58,16 @@ class SleepingBodies:
     def __init__(self, api: Any, client: int, settings: PhysicsSettings, store: BodyStore) -> None:
         self._api, self._client, self._settings, self._store = api, client, settings, store
         self._woken: dict[int, int] = {}  # movable bodies that can sleep, with the step of the last wake-up
-        self._jointed: list[int] = []
+        self._sleepless: list[int] = []  # robots, and movable bodies with a measured joint load
+        self._joints: dict[int, tuple[int, ...]] = {}  # movable joints of the bodies that can sleep
+        self._placed: dict[int, Any] = {}  # base and joint positions of these bodies at the last periodic wake-up
         self._never_move: set[int] = set()
         self._slept: set[int] = set()  # bodies asleep at the last check
         self._known: set[int] = set()  # bodies asleep at the last two checks
         self._steps = 0
         self._waking: set[int] = set()
         self._lost: list[tuple[int, Callable[[], None]]] = []
-        self._inside: set[int] = set()  # movable bodies that can sleep, except stored bodies
+        self._inside: set[int] = set()  # bodies that can sleep, except stored bodies and static bodies
         self._loaded: set[int] = set()  # bodies restored since the last step
         self._watched: set[int] = set()  # bodies whose contacts are read
         self._corners: dict[tuple[int, int], tuple[Any, Any]] = {}  # link boxes at the last check, by body and link
@@ -74,46 +79,50 @@ class SleepingBodies:
         self._settings = settings
         self.wake_all()
 
-    def add(self, body: int, fixed: bool, has_joints: bool) -> None:
+    def add(self, body: int, fixed: bool, joints: Sequence[int], is_robot: bool) -> None:
         """Adds a new body.
 
         Args:
             body: Number of the body.
-            fixed: Whether the body is fixed to the world.
-            has_joints: Whether the body has joints; such a body never sleeps.
+            fixed: Whether the root link is fixed to the world.
+            joints: Engine indices of the movable joints.
+            is_robot: Whether the body is a robot, which never sleeps.
         """
-        if has_joints:
-            self._jointed.append(body)
-        elif self._settings.rest_speed > 0.0 and fixed:
+        if is_robot:
+            self._sleepless.append(body)
+        elif self._settings.rest_speed > 0.0 and fixed and not joints:
             self._never_move.add(body)
             self._change(body, self._api.ACTIVATION_STATE_ENABLE_SLEEPING | self._api.ACTIVATION_STATE_SLEEP)
         elif self._settings.rest_speed > 0.0:
+            if joints:
+                self._joints[body] = tuple(joints)
             self._woken[body] = self._steps
             self._inside.add(body)
             self._change(body, self._api.ACTIVATION_STATE_ENABLE_SLEEPING)
 
     def body_id(self, body: int) -> int:
         """Returns the engine's id of a body, which is loaded again if it is stored."""
-        if body in self._store.stored_poses:
-            self._bring_back([body])
+        if body in self._store.stored:  # a movable body needs the bodies that it touches
+            self._bring_back([body] if body in self._never_move else self._store.find(self._store.box(body)))
         return self._store.body_id(body)
 
     def _bring_back(self, bodies: Collection[int]) -> None:
         self._store.bring_back(bodies)
-        self._inside.update(bodies)
+        self._inside.update(body for body in bodies if body not in self._never_move)
         self._loaded.update(bodies)
         for body in bodies:
             self._change(body, self._api.ACTIVATION_STATE_ENABLE_SLEEPING | self._api.ACTIVATION_STATE_SLEEP)
 
     def _bring_back_near(self, body: int) -> list[int]:
         """Brings the stored bodies at a body back, and returns them."""
-        found = self._store.find(self._boxes([body])) if self._store.stored_poses else []
+        stored = self._store.stored
+        found = self._store.find(self._store.box(body) if body in stored else self._boxes([body])) if stored else []
         self._bring_back(found)
         return found
 
     def watch(self, body: int) -> None:
         """Keeps a body and its neighbours in the engine, because its contacts are read."""
-        if body not in self._watched and body not in self._jointed:
+        if body not in self._watched and body not in self._sleepless:
             self._watched.add(body)
             for near in self._bring_back_near(body):
                 self.wake(near)
@@ -121,7 +130,10 @@ class SleepingBodies:
     def keep_awake(self, body: int) -> None:
         """Prevents a body from sleeping."""
         self.body_id(body)
-        if self._woken.pop(body, None) is not None or body in self._never_move:
+        if body in self._woken or body in self._never_move:
+            if self._woken.pop(body, None) is not None:
+                self._sleepless.append(body)
+            self._joints.pop(body, None)
             for bodies in (self._never_move, self._slept, self._known, self._inside):
                 bodies.discard(body)
             self._change(body, self._api.ACTIVATION_STATE_DISABLE_SLEEPING)
@@ -141,8 +153,10 @@ class SleepingBodies:
             bodies.discard(body)
         self._corners = {key: corners for key, corners in self._corners.items() if key[0] != body}
         self._lost = [each for each in self._lost if each[0] != body]
-        if body in self._jointed:
-            self._jointed.remove(body)
+        self._joints.pop(body, None)
+        self._placed.pop(body, None)
+        if body in self._sleepless:
+            self._sleepless.remove(body)
 
     def _change(self, body: int, activation: int) -> None:
         threshold = self._settings.rest_speed**2  # minimum of the sum of the squared velocities
@@ -170,9 +184,9 @@ class SleepingBodies:
         """Wakes the bodies that touched a body in the last step, because the body is about to move."""
         self._expect_motion()
         if self._woken:
-            near = self._bring_back_near(body)
+            self._bring_back_near(body)  # the contacts of loaded bodies are unknown until the next step
             points = self._api.getContactPoints(bodyA=self.body_id(body), physicsClientId=self._client)
-            for touched in sorted({*near, *(self._store.number(point[2]) for point in points)}):
+            for touched in sorted({*self._loaded, *(self._store.number(point[2]) for point in points)}):
                 self.wake(touched)
 
     def wake_near(self, body: int) -> None:
@@ -199,30 +213,41 @@ class SleepingBodies:
         """Static bodies, and bodies that have been asleep for at least REST_LOOK_S."""
         return self._never_move | self._known
 
+    @property
+    def motionless_bodies(self) -> Collection[int]:
+        """Static bodies and stored bodies."""
+        return self._never_move | self._store.stored.keys()
+
     def _update_sleeping(self) -> None:
         """Updates the sleeping bodies; this check detects bodies that the engine has woken by a contact."""
-        slept = {body for body in self._inside if self._is_at_rest(body)} | self._store.stored_poses.keys()
+        stored = self._store.stored.keys()
+        slept = {body for body in self._inside if self._is_at_rest(body)} | stored
         self._known, self._slept = slept & self._slept, slept
-        asleep = [body for body in self._known & self._inside if self._store.can_store(body)]
-        if len(asleep) > MAX_ASLEEP:
-            self._store_far(sorted(asleep))
+        resting = [*(self._known & self._inside), *(self._never_move - stored)]
+        resting = [body for body in resting if self._store.can_store(body)]
+        if len(resting) > MAX_ASLEEP:
+            self._store_far(sorted(resting))
 
-    def _store_far(self, asleep: list[int]) -> None:
-        """Stores the bodies that no body can reach soon."""
-        boxes = self._boxes(asleep)
-        others = [body for body in (*self._jointed, *self._woken) if body not in self._slept]
-        far = ~boxes.reached_from(self._boxes({*others, *self._watched}).grown(2.0 * _NEAR_M))
-        chosen = [body for body, is_far in zip(asleep, far, strict=True) if is_far]
-        self._store.store(chosen, Boxes(boxes.lower[far], boxes.upper[far]))
-        self._inside.difference_update(chosen)
-        self._expect_motion()
+    def _store_far(self, resting: list[int]) -> None:
+        """Stores the bodies that no other body can reach soon."""
+        hulls = Boxes.of_corners(self._boxes([body]).hull for body in resting)
+        movable = np.array([body not in self._never_move for body in resting], dtype=bool)
+        moving = {*self._sleepless, *self._watched, *(self._inside - self._slept)}
+        lying = self._inside.difference(resting, moving)  # these bodies keep the static bodies that they touch
+        seeds = self._boxes(moving).grown(2.0 * _NEAR_M).joined(self._boxes(lying))
+        far = ~hulls.reached_from(seeds, movable)
+        chosen = [body for body, is_far in zip(resting, far, strict=True) if is_far]
+        if chosen:
+            self._store.store(chosen, Boxes(hulls.lower[far], hulls.upper[far]), movable[far])
+            self._inside.difference_update(chosen)
+            self._expect_motion()
 
     def before_step(self) -> None:
         """Brings back the stored bodies that a moving body approaches; must be called before every step."""
         steps = self._steps - self._checked
-        if not self._store.stored_poses or not (self._may_approach or steps >= _APPROACH_STEPS):
+        if not self._store.stored or not (self._may_approach or steps >= _APPROACH_STEPS):
             return
-        moving = [*self._jointed, *(body for body in sorted(self._inside) if not self._is_at_rest(body))]
+        moving = [*self._sleepless, *(body for body in sorted(self._inside) if not self._is_at_rest(body))]
         corners = {(body, link): box for body in moving for link, box in self._link_corners(body).items()}
         boxes = Boxes.of_corners(corners.values())
         before = Boxes.of_corners(self._corners.get(key, box) for key, box in corners.items())
@@ -238,28 +263,34 @@ class SleepingBodies:
 
     def wake_all(self) -> None:
         """Wakes all bodies."""
-        self._bring_back(list(self._store.stored_poses))
+        self._bring_back(list(self._store.stored))
         for body in self._woken:
             self.wake(body)
 
     def _is_at_rest(self, body: int) -> bool:
         """Returns whether a body sleeps; the velocities of a sleeping body are exactly 0."""
-        if body in self._store.stored_poses:
+        if body in self._store.stored:
             return True
         if (self._steps - self._woken[body]) * self._settings.time_step_s < _REST_AFTER_S:
             return False
-        linear, angular = self._api.getBaseVelocity(self._store.body_id(body), physicsClientId=self._client)
-        return not any(linear) and not any(angular)
+        body_id = self._store.body_id(body)
+        linear, angular = self._api.getBaseVelocity(body_id, physicsClientId=self._client)
+        if any(linear) or any(angular):
+            return False
+        joints = self._joints.get(body, ())
+        states = self._api.getJointStatesMultiDof(body_id, joints, physicsClientId=self._client) if joints else ()
+        return not any(any(state[1]) for state in states)
 
     def disturb(self, body: int, action: Callable[[], None]) -> None:
         """Wakes a body and applies an action to it; for a sleeping body, the action is repeated after the step."""
-        self.wake(body)
+        if body in self._woken:
+            self.wake(body)
         action()
         if body in self._waking:
             self._lost.append((body, action))
 
     def after_step(self) -> None:
-        """Repeats lost actions, and wakes the bodies in contact with bodies with joints periodically."""
+        """Repeats lost actions, and wakes the bodies in contact with robots and moved joints periodically."""
         self._steps += 1
         for _, action in self._lost:
             action()
@@ -269,5 +300,21 @@ class SleepingBodies:
         if self._steps % round(REST_LOOK_S / self._settings.time_step_s) == 0:
             self._update_sleeping()
         if self._steps % round(_WAKE_PERIOD_S / self._settings.time_step_s) == 0:
-            for body in self._jointed:
+            for body in (*self._sleepless, *self._moved_by_joints()):
                 self.wake_touching(body)
+
+    def _moved_by_joints(self) -> list[int]:
+        """Returns the bodies with joints that have moved since the last call, except sleeping bodies."""
+        moved = []
+        for body, joints in self._joints.items():
+            if body in self._slept:
+                continue
+            body_id = self._store.body_id(body)
+            states = self._api.getJointStatesMultiDof(body_id, joints, physicsClientId=self._client)
+            base = self._api.getBasePositionAndOrientation(body_id, physicsClientId=self._client)
+            placed = np.concatenate([*base, *(state[0] for state in states)])
+            before = self._placed.get(body)
+            self._placed[body] = placed
+            if before is None or np.abs(placed - before).max() > _MOVED:
+                moved.append(body)
+        return moved

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies at rest outside of PyBullet, whose step costs about 1 us for every body, even for a sleeping body.
+"""Bodies at rest outside of PyBullet, whose step costs about 1 us for every body, even for a static or sleeping body.
 
-A stored body is removed from the engine and loaded again later, at the same pose and with the same properties. The
+A stored body is removed from the engine and loaded again later, with the same pose, joint positions and properties. The
 engine gives a reloaded body a new id, so all other modules use ids that do not change.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_engine import LinkMotion
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +42,15 @@ class Boxes:
         array = np.array(list(corners), dtype=float).reshape(-1, 2, 3)
         return cls(array[:, 0], array[:, 1])
 
+    def joined(self, others: Boxes) -> Boxes:
+        """Returns these boxes and other boxes."""
+        return Boxes(np.concatenate((self.lower, others.lower)), np.concatenate((self.upper, others.upper)))
+
+    @property
+    def hull(self) -> tuple[Array, Array]:
+        """Returns the corners of the smallest box around all boxes."""
+        return self.lower.min(axis=0), self.upper.max(axis=0)
+
     def grown(self, margins: Array | float) -> Boxes:
         """Returns the boxes with margins on all sides [m]."""
         margin = np.broadcast_to(np.asarray(margins, dtype=float), len(self.lower))[:, None]
@@ -50,21 +60,61 @@ class Boxes:
         """Returns for each box whether another box overlaps it."""
         found = np.zeros(len(self.lower), dtype=bool)
         if len(others.lower):
-            hull = (self.lower <= others.upper.max(axis=0)) & (self.upper >= others.lower.min(axis=0))
+            low, high = others.hull
+            hull = (self.lower <= high) & (self.upper >= low)
             near = np.flatnonzero(np.all(hull, axis=1))
             lower, upper = self.lower[near, None], self.upper[near, None]
             overlaps = np.all((lower <= others.upper) & (upper >= others.lower), axis=2)
             found[near] = np.any(overlaps, axis=1)
         return found
 
-    def reached_from(self, seeds: Boxes) -> npt.NDArray[np.bool_]:
-        """Returns for each box whether a motion of the seeds can reach it, directly or through other boxes."""
+    def reached_from(self, seeds: Boxes, movable: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Returns for each box whether a motion of the seeds can reach it, directly or through movable boxes.
+
+        Args:
+            seeds: Boxes of moving bodies.
+            movable: Whether each box moves if it is pushed, shape (boxes,); a static body passes no motion on.
+        """
         reached = front = self.overlapped_by(seeds)
-        while front.any():
-            neighbours = self.overlapped_by(Boxes(self.lower[front], self.upper[front]).grown(_GAP_M))
+        while (pushed := front & movable).any():
+            neighbours = self.overlapped_by(Boxes(self.lower[pushed], self.upper[pushed]).grown(_GAP_M))
             front = neighbours & ~reached
             reached = reached | front
         return reached
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """Everything needed to load a body again.
+
+    Attributes:
+        text: URDF of the body.
+        fixed: Whether the root link is fixed to the world.
+        joints: Engine indices of the movable joints.
+        options: Properties by link index, as options of the engine.
+        motors: Settings of joint motors by joint index, as functions that apply the settings.
+    """
+
+    text: str
+    fixed: bool
+    joints: tuple[int, ...]
+    options: dict[int, dict[str, Any]] = field(default_factory=dict)
+    motors: dict[int, Callable[[], None]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class StoredMotion:
+    """State of a stored body, which is at rest.
+
+    Attributes:
+        centre: Pose of the root link's centre of mass.
+        links: Motions of the other links, by link index.
+        joints: Positions of the movable joints by index [rad or m]; a quaternion xyzw for a ball joint.
+    """
+
+    centre: Pose
+    links: tuple[LinkMotion, ...]
+    joints: dict[int, tuple[float, ...]]
 
 
 class BodyStore:
@@ -73,21 +123,21 @@ class BodyStore:
     Args:
         api: Module pybullet.
         client: Id of the connection.
-        load: Function that loads a movable body from URDF text and returns its id.
+        load: Function that loads a body from URDF text, fixed to the world or not, and returns its id.
     """
 
-    def __init__(self, api: Any, client: int, load: Callable[[str], int]) -> None:
+    def __init__(self, api: Any, client: int, load: Callable[[str, bool], int]) -> None:
         self._api, self._client, self._load = api, client, load
         self._ids: dict[int, int] = {}
         self._numbers: dict[int, int] = {}
-        self._texts: dict[int, str] = {}
-        self._options: dict[int, dict[str, Any]] = {}
-        self._stored: dict[int, Pose] = {}
+        self._recipes: dict[int, Recipe] = {}
+        self._stored: dict[int, StoredMotion] = {}
         self._boxes = Boxes.of_corners(())
+        self._movable = np.zeros(0, dtype=bool)
 
     @property
-    def stored_poses(self) -> dict[int, Pose]:
-        """Returns the poses of the centres of mass of the stored bodies, by number."""
+    def stored(self) -> dict[int, StoredMotion]:
+        """Returns the states of the stored bodies, by number."""
         return self._stored
 
     def add(self, body: int) -> int:
@@ -100,29 +150,47 @@ class BodyStore:
         self._ids[number], self._numbers[body] = body, number
         return number
 
-    def keep_text(self, number: int, text: str) -> None:
-        """Allows to store a body without joints.
+    def keep_recipe(self, number: int, text: str, fixed: bool, joints: Sequence[int]) -> None:
+        """Allows to store a body.
 
         Args:
             number: Number of the body.
             text: URDF of the body.
+            fixed: Whether the root link is fixed to the world.
+            joints: Engine indices of the movable joints.
         """
-        self._texts[number], self._options[number] = text, {}
+        self._recipes[number] = Recipe(text, fixed, tuple(joints))
 
     def can_store(self, number: int) -> bool:
         """Returns whether a body can be stored."""
-        return number in self._texts
+        return number in self._recipes
 
-    def note(self, number: int, options: dict[str, Any]) -> None:
-        """Records properties of a root link, which a loaded body gets again."""
-        if number in self._options:
-            self._options[number] |= options
+    def note_options(self, number: int, index: int, options: dict[str, Any]) -> None:
+        """Records properties of a link, which a loaded body gets again.
+
+        Args:
+            number: Number of the body.
+            index: Index of the link in the engine.
+            options: Options of the engine.
+        """
+        if number in self._recipes:
+            self._recipes[number].options.setdefault(index, {}).update(options)
+
+    def note_motor(self, number: int, index: int, setting: Callable[[], None]) -> None:
+        """Records the setting of a joint motor, which a loaded body gets again.
+
+        Args:
+            number: Number of the body.
+            index: Index of the joint in the engine.
+            setting: Function that applies the setting.
+        """
+        if number in self._recipes:
+            self._recipes[number].motors[index] = setting
 
     def remove(self, number: int) -> None:
         """Forgets a body of the engine."""
         self._numbers.pop(self._ids.pop(number), None)
-        self._texts.pop(number, None)
-        self._options.pop(number, None)
+        self._recipes.pop(number, None)
 
     def number(self, body: int) -> int:
         """Returns the number of a body of the engine."""
@@ -132,27 +200,41 @@ class BodyStore:
         """Returns the id of a body in the engine."""
         return self._ids[number]
 
-    def store(self, numbers: list[int], boxes: Boxes) -> None:
-        """Removes sleeping bodies from the engine.
+    def store(self, numbers: list[int], boxes: Boxes, movable: npt.NDArray[np.bool_]) -> None:
+        """Removes bodies at rest from the engine.
 
         Args:
             numbers: Numbers of the bodies.
             boxes: Their boxes.
+            movable: Whether each body moves if it is pushed, shape (bodies,).
         """
         for number in numbers:
             body = self._ids[number]
-            pose = self._api.getBasePositionAndOrientation(body, physicsClientId=self._client)
-            self._stored[number] = Pose(*pose)
+            self._stored[number] = self._motion(number)
             self._api.removeBody(body, physicsClientId=self._client)
             self._ids[number] = -1
             del self._numbers[body]
-        self._boxes = Boxes(
-            np.concatenate((self._boxes.lower, boxes.lower)), np.concatenate((self._boxes.upper, boxes.upper))
+        self._boxes = self._boxes.joined(boxes)
+        self._movable = np.concatenate((self._movable, movable))
+
+    def _motion(self, number: int) -> StoredMotion:
+        api, client, body, joints = self._api, self._client, self._ids[number], self._recipes[number].joints
+        links = range(api.getNumJoints(body, physicsClientId=client))
+        states = api.getJointStatesMultiDof(body, joints, physicsClientId=client) if joints else ()
+        return StoredMotion(
+            Pose(*api.getBasePositionAndOrientation(body, physicsClientId=client)),
+            tuple(link_motion(api.getLinkState(body, link, 1, 1, physicsClientId=client)) for link in links),
+            {joint: tuple(state[0]) for joint, state in zip(joints, states, strict=True)},
         )
+
+    def box(self, number: int) -> Boxes:
+        """Returns the box of a stored body."""
+        index = list(self._stored).index(number)
+        return Boxes(self._boxes.lower[index : index + 1], self._boxes.upper[index : index + 1])
 
     def find(self, seeds: Boxes) -> list[int]:
         """Returns the stored bodies that a motion of the seeds can reach, directly or through other bodies."""
-        reached = self._boxes.reached_from(seeds)
+        reached = self._boxes.reached_from(seeds, self._movable)
         return list(itertools.compress(self._stored, reached)) if reached.any() else []
 
     def bring_back(self, numbers: Iterable[int]) -> None:
@@ -161,12 +243,22 @@ class BodyStore:
         if not chosen:
             return
         kept = np.array([number not in chosen for number in self._stored], dtype=bool)
-        self._boxes = Boxes(self._boxes.lower[kept], self._boxes.upper[kept])
+        self._boxes, self._movable = Boxes(self._boxes.lower[kept], self._boxes.upper[kept]), self._movable[kept]
         for number in sorted(chosen):
-            pose = self._stored.pop(number)
-            body = self._load(self._texts[number])
+            motion, recipe = self._stored.pop(number), self._recipes[number]
+            body = self._load(recipe.text, recipe.fixed)
             self._ids[number], self._numbers[body] = body, number
-            self._api.changeDynamics(body, -1, **self._options[number], physicsClientId=self._client)
+            for index, options in recipe.options.items():
+                self._api.changeDynamics(body, index, **options, physicsClientId=self._client)
             self._api.resetBasePositionAndOrientation(
-                body, pose.position, pose.quaternion, physicsClientId=self._client
+                body, motion.centre.position, motion.centre.quaternion, physicsClientId=self._client
             )
+            for index, position in motion.joints.items():
+                self._api.resetJointStateMultiDof(body, index, position, physicsClientId=self._client)
+            for set_motor in recipe.motors.values():
+                set_motor()
+
+
+def link_motion(record: tuple[Any, ...]) -> LinkMotion:
+    """Converts the engine's record of a link."""
+    return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])

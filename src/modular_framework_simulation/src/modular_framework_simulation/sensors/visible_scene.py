@@ -64,26 +64,25 @@ class SceneTracker:
     def __init__(self, world: PhysicsWorld, robots: Mapping[str, LinkVisuals]) -> None:
         self._world, self._robots = world, robots
         self._links: dict[int, tuple[str, ...]] = {}
-        self._revision = -1
+        self._time_ns = self._revision = -1
 
     def update(self, cameras: Sequence[Camera]) -> SceneUpdate:
         """Returns the changes since the last update; cameras on removed models are left out."""
         world = self._world
-        names = {world.instance(name): name for name in world.names()}
-        removed = tuple(number for number in self._links if number not in names)
-        for number in removed:
-            del self._links[number]
+        moved = {world.instance(name): name for name in world.moved_since(self._time_ns, self._revision, woken=True)}
+        removed: tuple[int, ...] = ()
         added: dict[int, tuple[tuple[Visual, ...], ...]] = {}
         poses: dict[int, tuple[Pose, ...]] = {}
-        for number, name in names.items():
-            body = world.body(name)
+        if world.revision != self._revision:
+            removed = tuple(number for number in self._links if number not in moved)
+            for number in removed:
+                del self._links[number]
+        for number, name in sorted(moved.items()):
             if number not in self._links:
                 visuals = self._visuals(name)
                 self._links[number], added[number] = tuple(visuals), tuple(visuals.values())
-            elif body.static and body.spec is not None and world.revision == self._revision:
-                continue
-            poses[number] = tuple(body.link_state(link).pose for link in self._links[number])
-        self._revision = world.revision
+            poses[number] = tuple(world.body(name).link_state(link).pose for link in self._links[number])
+        self._time_ns, self._revision = world.time_ns, world.revision
         return SceneUpdate(world.time_ns, added, removed, poses, self._camera_poses(cameras))
 
     def _visuals(self, name: str) -> LinkVisuals:
