@@ -9,13 +9,21 @@ import numpy as np
 import pytest
 from predicate_worlds import STANDING_M, sample, stage_of, state
 
+from mbf_method.errors import MethodFault
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.failure_classes import FailureClass, failure_class
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.predicates.conditions import NoContact, Untouched
 from modular_framework_benchmark.predicates.world_track import WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, REACHABLE, Figure, MethodFault
+from modular_framework_ros.reported_figures import (
+    CANDIDATES,
+    ERROR_CODE,
+    METHOD_FAULT,
+    PLANNER_FAULT,
+    REACHABLE,
+    Figure,
+)
 
 FAILED = EpisodeMeasurements(TaskSettings(), EpisodeStatus.FAILED, target="cube")
 
@@ -69,6 +77,8 @@ def test_how_an_episode_ended_comes_first(status: EpisodeStatus, expected: Failu
         (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.RAISED}), FailureClass.INVALID_OUTPUT),
         (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.INVALID_RESULT}), FailureClass.INVALID_OUTPUT),
         (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.TOO_LARGE}), FailureClass.INVALID_OUTPUT),
+        (report("planning", 2.0, False, {PLANNER_FAULT: MethodFault.DIED}), FailureClass.DIED),
+        (report("planning", 2.0, False, {PLANNER_FAULT: MethodFault.RAISED}), FailureClass.INVALID_OUTPUT),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -31.0}), FailureClass.UNREACHABLE),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -1.0}), FailureClass.NO_PLAN),
         (report("execution", 2.0, succeeded=False), FailureClass.MOTION),

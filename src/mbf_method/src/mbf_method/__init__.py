@@ -3,15 +3,22 @@
 
 from mbf_method.grasp_request import CameraView, GraspRequest, Gripper, RobotState, SceneObject
 from mbf_method.grasps import Grasps
-from mbf_method.served_method import ServedMethod, grasp_method
+from mbf_method.joint_path import JointPath, no_path
+from mbf_method.path_request import Obstacle, PathRequest
+from mbf_method.served_method import ServedMethod, grasp_method, planner
 
 __all__ = [
     "CameraView",
     "GraspRequest",
     "Grasps",
     "Gripper",
+    "JointPath",
+    "Obstacle",
+    "PathRequest",
     "RobotState",
     "SceneObject",
     "ServedMethod",
     "grasp_method",
+    "no_path",
+    "planner",
 ]

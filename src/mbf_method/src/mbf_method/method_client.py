@@ -8,13 +8,15 @@ import threading
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Callable, Iterator, Mapping
 
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidURI
 from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection, connect
 
 from mbf_method.errors import (
+    CallCancelledError,
     InvalidOutputError,
     MethodDiedError,
     MethodError,
@@ -28,6 +30,7 @@ from mbf_method.method_process import MethodProcess
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
 RETRY_PERIOD_S = 0.05
+CANCEL_PERIOD_S = 0.1
 EXIT_TIMEOUT_S = 2.0
 """Maximum wait for the exit code after a process has closed its connection [s]."""
 
@@ -39,10 +42,12 @@ class MethodSource:
     Attributes:
         command: Program and arguments that start the method.
         address: Address of a running method, such as ws://127.0.0.1:8700.
+        record_folder: Folder for copies of all requests, as inputs of `check_method`; "" for no copies.
     """
 
     command: tuple[str, ...] = ()
     address: str = ""
+    record_folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,17 +67,19 @@ class MethodLimits:
 
 @dataclass(frozen=True)
 class CallTimes:
-    """Durations of a call [s]; their sum is the time from the request to the result.
+    """Durations of a call [s]; the sum of the first three is the time from the request to the result.
 
     Attributes:
         method_s: Duration of the method's function, measured in the method's process.
         queue_s: Wait for other requests, measured in the method's process.
         transport_s: Remaining time: encoding, transfer and decoding.
+        processor_s: Processor time of the method's process during its function, without its children.
     """
 
     method_s: float
     queue_s: float
     transport_s: float
+    processor_s: float
 
 
 @dataclass(frozen=True)
@@ -126,18 +133,26 @@ class MethodClient:
             self.close()
             raise
 
-    def call(self, request: Any) -> MethodResult:
+    def call(
+        self, request: Any, limit_s: float | None = None, is_cancelled: Callable[[], bool] | None = None
+    ) -> MethodResult:
         """Calls the method.
 
         Args:
             request: Dataclass with the inputs.
+            limit_s: Maximum time of this call [s]; None for the limit of all calls.
+            is_cancelled: Function, called regularly, that returns whether to end the call; None for never.
 
         Raises:
             MethodError: The method returns no result; the class of the error is the kind of fault.
+            CallCancelledError: The call was cancelled; the next call starts or connects again.
         """
         self.start()
         started_s = time.perf_counter()
-        data = self._exchange(pack(request))
+        encoded = pack(request)
+        if self._source.record_folder:
+            _record(encoded, Path(self._source.record_folder))
+        data = self._exchange(encoded, self._limits.call_s if limit_s is None else limit_s, is_cancelled)
         if isinstance(data, str):
             raise MethodRaisedError(
                 f"the function of the method raised {data.strip().splitlines()[-1]}; its log has the traceback"
@@ -147,12 +162,14 @@ class MethodClient:
         try:
             timing = message["server_timing"]
             method_s, queue_s = (1e-3 * float(timing[name]) for name in ("infer_ms", "queue_ms"))
+            processor_s = 1e-3 * float(timing.get("processor_ms", 0.0))
             result = dict(message["result"])
         except (KeyError, TypeError, ValueError) as error:
             raise InvalidOutputError(
                 f"the message of the method has no result with server_timing: {error!r}"
             ) from error
-        return MethodResult(result, CallTimes(method_s, queue_s, max(0.0, total_s - method_s - queue_s)))
+        transport_s = max(0.0, total_s - method_s - queue_s)
+        return MethodResult(result, CallTimes(method_s, queue_s, transport_s, processor_s))
 
     def close(self) -> None:
         """Closes the connection, and ends the process that this client started."""
@@ -208,18 +225,21 @@ class MethodClient:
             )
         self.needs_camera = bool(greeting.get("needs_camera"))
 
-    def _exchange(self, request: bytes) -> Any:
+    def _exchange(self, request: bytes, limit_s: float, is_cancelled: Callable[[], bool] | None) -> Any:
         """Sends a request and returns the response; closes the connection and the process on failure."""
         assert self._connection is not None
         try:
-            with _deadline(self._connection, self._limits.call_s) as expired:
+            with _deadline(self._connection, limit_s) as expired:
                 self._connection.send(request)
-                return self._connection.recv()
+                return _response(self._connection, is_cancelled)
+        except CallCancelledError:
+            self.close()
+            raise
         except ConnectionClosed as closed:
             ended = self._process.end_text(EXIT_TIMEOUT_S) if self._process and not expired.is_set() else ""
             self.close()
             if expired.is_set():
-                raise MethodLateError(f"the method returned no result within {self._limits.call_s:g} s") from closed
+                raise MethodLateError(f"the method returned no result within {limit_s:.3g} s") from closed
             if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
                 raise TooLargeError(
                     f"the result is larger than {self._limits.result_bytes} bytes: {closed.sent.reason}"
@@ -227,6 +247,23 @@ class MethodClient:
             if closed.rcvd is not None and closed.rcvd.code == CloseCode.MESSAGE_TOO_BIG:
                 raise TooLargeError(f"the request of {len(request)} bytes is larger than allowed") from closed
             raise MethodDiedError(f"the method died: {ended or f'the connection was closed ({closed})'}") from closed
+
+
+def _response(connection: ClientConnection, is_cancelled: Callable[[], bool] | None) -> Any:
+    """Waits for a response; raises CallCancelledError as soon as the call is cancelled."""
+    while is_cancelled is not None:
+        try:
+            return connection.recv(timeout=CANCEL_PERIOD_S)
+        except TimeoutError as error:
+            if is_cancelled():
+                raise CallCancelledError("the call was cancelled") from error
+    return connection.recv()
+
+
+def _record(request: bytes, folder: Path) -> None:
+    """Writes an encoded request to the next free number in a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{len(list(folder.glob('*.msgpack'))) + 1:04d}.msgpack").write_bytes(request)
 
 
 @contextmanager

@@ -16,6 +16,8 @@ from websockets.sync.server import ServerConnection, serve
 
 from mbf_method.grasp_request import GraspRequest
 from mbf_method.grasps import Grasps
+from mbf_method.joint_path import JointPath
+from mbf_method.path_request import PathRequest
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
 PORT_VARIABLE = "MBF_METHOD_PORT"
@@ -23,7 +25,8 @@ PORT_VARIABLE = "MBF_METHOD_PORT"
 DEFAULT_PORT = 8700
 MAX_REQUEST_BYTES = 1 << 28
 PARENT_PERIOD_S = 1.0
-GRASPS = "grasps"
+GRASPS, PATHS = "grasps", "paths"
+"""Kinds of methods."""
 
 GraspFunction = Callable[[GraspRequest], Grasps]
 
@@ -112,6 +115,11 @@ def grasp_method(
     return decorate if function is None else decorate(function)
 
 
+def planner(function: Callable[[PathRequest], JointPath]) -> ServedMethod:
+    """Decorates a function that returns a path to a goal; `ServedMethod.serve` serves the function."""
+    return ServedMethod(function, PATHS, PathRequest.from_message, JointPath)
+
+
 class _Handler:
     """Responds to the requests of all connections, one request at a time."""
 
@@ -143,10 +151,14 @@ class _Handler:
             with self._turn:
                 started_s = time.perf_counter()
                 request = self._method.read_request(unpack(data.encode() if isinstance(data, str) else data))
-                called_s = time.perf_counter()
+                called_s, processor_s = time.perf_counter(), time.process_time()
                 result = self._method(request)
-                ended_s = time.perf_counter()
-            timing = {"infer_ms": 1e3 * (ended_s - called_s), "queue_ms": 1e3 * (started_s - received_s)}
+                ended_s, processor_s = time.perf_counter(), time.process_time() - processor_s
+            timing = {
+                "infer_ms": 1e3 * (ended_s - called_s),
+                "queue_ms": 1e3 * (started_s - received_s),
+                "processor_ms": 1e3 * processor_s,
+            }
             return pack({"result": result, "server_timing": timing})
         except Exception:  # any exception of the method becomes the response
             logger.exception("%s failed", self._method.function.__name__)

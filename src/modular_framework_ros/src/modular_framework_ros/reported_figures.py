@@ -7,8 +7,8 @@ and clock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum, IntEnum
+from dataclasses import dataclass, replace
+from enum import Enum
 
 
 class Clock(Enum):
@@ -47,17 +47,6 @@ class Figure:
     source: Source = Source.SAID
 
 
-class MethodFault(IntEnum):
-    """Fault of an external method; value of the figure `METHOD_FAULT`."""
-
-    NOT_STARTED = 1
-    DIED = 2
-    LATE = 3
-    RAISED = 4
-    INVALID_RESULT = 5
-    TOO_LARGE = 6
-
-
 CANDIDATES = Figure("candidates", "generation", "", "Grasps found before their reachability was checked.")
 CHECKED = Figure("checked", "generation", "", "Grasps whose reachability was checked.")
 REACHABLE = Figure("reachable", "generation", "", "Grasps that the arm can reach without a collision.")
@@ -68,8 +57,16 @@ TRANSPORT_TIME = Figure(
     "transport_time_s", "generation", "s", "Time to exchange messages with an external method.", Clock.WALL
 )
 METHOD_FAULT = Figure(
-    "method_fault", "generation", "", "Fault of an external method, a value of `MethodFault`.", source=Source.MEASURED
+    "method_fault",
+    "generation",
+    "",
+    "Fault of an external method, a value of `mbf_method.errors.MethodFault`.",
+    source=Source.MEASURED,
 )
+PLANNER_METHOD_TIME, PLANNER_QUEUE_TIME, PLANNER_TRANSPORT_TIME, PLANNER_FAULT = (
+    replace(figure, component="planning") for figure in (METHOD_TIME, QUEUE_TIME, TRANSPORT_TIME, METHOD_FAULT)
+)
+"""The same figures of a planner."""
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
 PROCESSOR_TIME = Figure("processor_s", "planning", "s", "Processor time of the plan.", Clock.PROCESSOR, Source.MEASURED)
 CONCURRENT = Figure(

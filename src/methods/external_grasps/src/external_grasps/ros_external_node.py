@@ -11,16 +11,7 @@ from sensor_msgs.msg import JointState
 
 from external_grasps.grasp_conversions import grasp_candidates, grasp_request
 from external_grasps.ros_camera_source import CameraSource
-from mbf_method.errors import (
-    InvalidOutputError,
-    MethodDiedError,
-    MethodError,
-    MethodLateError,
-    MethodRaisedError,
-    MethodStartError,
-    MethodVersionError,
-    TooLargeError,
-)
+from mbf_method.errors import MethodError, MethodFault
 from mbf_method.grasp_request import RobotState
 from mbf_method.grasps import checked_grasps
 from mbf_method.method_client import CallTimes, MethodClient, MethodLimits, MethodSource
@@ -39,18 +30,7 @@ from modular_framework_ros.reported_figures import (
     QUEUE_TIME,
     TRANSPORT_TIME,
     Figure,
-    MethodFault,
 )
-
-FAULTS: dict[type[MethodError], MethodFault] = {
-    MethodStartError: MethodFault.NOT_STARTED,
-    MethodVersionError: MethodFault.NOT_STARTED,
-    MethodDiedError: MethodFault.DIED,
-    MethodLateError: MethodFault.LATE,
-    MethodRaisedError: MethodFault.RAISED,
-    InvalidOutputError: MethodFault.INVALID_RESULT,
-    TooLargeError: MethodFault.TOO_LARGE,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +38,7 @@ class ExternalSettings:
     """Parameters that determine the method and its limits.
 
     Attributes:
-        source: Location of the method (``~command``, ``~address``).
+        source: Location of the method (``~command``, ``~address``), and of copies of its inputs (``~record_inputs``).
         limits: Time and size limits (``~start_limit``, ``~time_limit``, ``~size_limit``).
     """
 
@@ -92,6 +72,10 @@ class ExternalMethod(ParameterisedMethod):
     def connect(self) -> None:
         """Subscribes to the joint states and starts the method; a fault is logged."""
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
+        self.start()
+
+    def start(self) -> None:
+        """Starts the method, no effect while it runs; a fault is logged."""
         try:
             self._started_client()
         except MethodError as error:
@@ -114,7 +98,7 @@ class ExternalMethod(ParameterisedMethod):
             self._times.append(result.times)
             grasps = checked_grasps(result.message, request, max_grasps)
         except MethodError as error:
-            self._fault = FAULTS[type(error)]
+            self._fault = error.fault
             raise MethodFaultError(str(error)) from error
         return grasp_candidates(grasps, query.gripper, settings)
 
@@ -159,9 +143,9 @@ def read_external_settings(read: ReadNumber) -> ExternalSettings:
     Args:
         read: Function that reads a parameter.
     """
-    command, address = read("~command"), read("~address")
+    command, address, folder = read("~command"), read("~address"), read("~record_inputs")
     return ExternalSettings(
-        MethodSource(tuple(command), str(address)),
+        MethodSource(tuple(command), str(address), str(folder)),
         MethodLimits(read("~start_limit"), read("~time_limit"), int(read("~size_limit"))),
     )
 

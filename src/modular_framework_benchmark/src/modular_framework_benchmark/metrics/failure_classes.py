@@ -8,12 +8,13 @@ from enum import Enum
 
 import numpy as np
 
+from mbf_method.errors import MethodFault
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.predicates.conditions import Untouched
 from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.world_track import ROBOT, Floats, WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, REACHABLE, MethodFault
+from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, PLANNER_FAULT, REACHABLE
 
 SLIP_HEIGHT_M = 0.05
 """Height above its start up to which a lost object has slipped; from higher, it was dropped [m]."""
@@ -98,9 +99,9 @@ def _held_objects(world: WorldTrack | None) -> set[str]:
 
 
 def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> FailureClass:
-    if METHOD_FAULT in report.figures:
-        died = report.figures[METHOD_FAULT] in _DEATHS
-        return FailureClass.DIED if died else FailureClass.INVALID_OUTPUT
+    fault = report.figures.get(METHOD_FAULT) or report.figures.get(PLANNER_FAULT)
+    if fault:
+        return FailureClass.DIED if fault in _DEATHS else FailureClass.INVALID_OUTPUT
     if report.component == "generation":
         reachable = report.figures.get(REACHABLE)
         return FailureClass.UNREACHABLE if reachable == 0.0 and _found_any(report) else FailureClass.NO_CANDIDATE

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Command that creates a method: `python -m mbf_method.create_method NAME --kind planner`."""
+
+from __future__ import annotations
+
+import argparse
+import keyword
+import sys
+from pathlib import Path
+from typing import Sequence
+
+TEMPLATES = Path(__file__).parent / "templates"
+TEMPLATE_NAME = "new_method"
+GRASP_EXPERIMENT = """\
+# Compares NAME with the antipodal grasps of the framework, without simulation. In a shell of ./install.sh shell:
+#
+#   rosrun modular_framework_benchmark run_experiment experiment.yaml
+
+experiment: NAME
+mode: grasps
+robot: panda_hand_moveit_config
+group: panda_manipulator             # the tip of this group is the grasp frame
+gripper_joint: panda_finger_joint1
+objects: [{model: $object, x: [-0.2, 0.2], y: [0.4, 0.6], yaw: [-3.14, 3.14], rests_at: 0.84}]
+
+factors:
+  method:
+    antipodal: {method: antipodal_grasps.ros_antipodal_node:AntipodalMethod}
+    NAME:
+      method: external_grasps.ros_external_node:ExternalMethod
+      method_parameters: {command: [COMMAND]}
+  object: [cube, can]
+compare: method
+metrics: [success, generation_time, candidates, reachable_share]
+
+trials: 5                            # scenes and seeds, equal for both methods
+seed: 1
+time_limit: 120                      # time limit of an episode [s]
+"""
+PLANNER_EXPERIMENT = """\
+# Compares NAME with RRTConnect of the framework, without simulation. In a shell of ./install.sh shell:
+#
+#   rosrun modular_framework_benchmark make_problems panda_hand_moveit_config panda_arm problems --count 20
+#   rosrun modular_framework_benchmark run_experiment experiment.yaml
+
+experiment: NAME
+mode: planning
+robot: panda_hand_moveit_config      # a MoveIt configuration package
+problems: problems                   # folder of sceneNNNN.yaml and requestNNNN.yaml, beside this file
+planning_time: 5                     # [s]
+
+factors:
+  planner:
+    RRTConnect: {pipeline: ompl, planner: RRTConnect}
+    NAME:
+      pipeline: external
+      parameters: {/move_group/planning_pipelines/external/command: [COMMAND]}
+compare: planner
+metrics: [success, planning_time, planner_method_time, planner_transport_time, path_length]
+
+trials: 20                           # problems and seeds, equal for both planners
+seed: 1
+time_limit: 60                       # time limit of an episode [s]
+"""
+EXPERIMENTS = {"grasp": GRASP_EXPERIMENT, "planner": PLANNER_EXPERIMENT}
+
+
+def create_method(name: str, kind: str, parent: Path) -> Path:
+    """Creates a folder with a method, a test and an experiment, and returns the folder.
+
+    The experiment runs the method with the interpreter of this process.
+
+    Args:
+        name: Name of the method, a Python identifier.
+        kind: Key of `EXPERIMENTS`.
+        parent: Folder of the new folder.
+
+    Raises:
+        ValueError: The name is no Python identifier.
+        FileExistsError: The folder exists.
+    """
+    if not name.isidentifier() or keyword.iskeyword(name):
+        raise ValueError(f"the name is '{name}'; it must be a Python identifier, such as my_{kind}")
+    folder = parent.resolve() / name
+    if folder.exists():
+        raise FileExistsError(f"{folder} exists; choose another name, or remove the folder")
+    folder.mkdir(parents=True)
+    for template, file in ((f"{kind}.py", f"{name}.py"), (f"{kind}_test.py", f"test_{name}.py")):
+        text = (TEMPLATES / template).read_text(encoding="utf-8").split("\n", 1)[1]  # without the licence
+        (folder / file).write_text(text.replace(TEMPLATE_NAME, name), encoding="utf-8")
+    command = ", ".join(f'"{part}"' for part in (sys.executable, folder / f"{name}.py"))
+    experiment = EXPERIMENTS[kind].replace("NAME", name).replace("COMMAND", command)
+    (folder / "experiment.yaml").write_text(experiment, encoding="utf-8")
+    return folder
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; returns 0 on success, otherwise 1."""
+    parser = argparse.ArgumentParser(prog="create_method", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("name", metavar="NAME", help="name of the method, a Python identifier")
+    parser.add_argument("--kind", choices=sorted(EXPERIMENTS), required=True, help="kind of the method")
+    parser.add_argument("--into", type=Path, default=Path(), metavar="FOLDER", help="parent folder; default: here")
+    options = parser.parse_args(arguments)
+    try:
+        folder = create_method(options.name, options.kind, options.into)
+    except (OSError, ValueError) as error:
+        print(f"create_method: {error}", file=sys.stderr)
+        return 1
+    method = folder / f"{options.name}.py"
+    print(f"created {method}, test_{options.name}.py and experiment.yaml; next:")
+    print(f"  {sys.executable} -m mbf_method.check_method --kind {options.kind} -- {sys.executable} {method}")
+    print(f"  rosrun modular_framework_benchmark run_experiment {folder / 'experiment.yaml'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
