@@ -35,7 +35,9 @@ from modular_framework_core.grasp_generation.grasp_candidates import (
     GraspCandidate,
     GraspMethod,
     GraspQuery,
+    MeasuredMethod,
     NoCandidatesError,
+    ProcessMethod,
 )
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
@@ -54,11 +56,12 @@ ALLOWED_METHOD = "allowed: MODULE:CLASS of a grasp method, such as top_down_gras
 
 @dataclass(frozen=True, slots=True)
 class _GraspSetup:
-    """Data shared by episodes with the same robot and hand."""
+    """Data shared by episodes with the same robot, hand and method."""
 
     robot: Robot
     solver: InverseKinematics
     gripper: GripperGeometry
+    method: GraspMethod
 
 
 class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
@@ -69,7 +72,9 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
         settings = spec.settings_of(GraspSettings)
         prepared = self.cached_setup(settings)
         scene = grasp_scene(prepared.robot.model, settings.objects, settings.target)
-        method = load_method(settings.method, settings.method_parameters)
+        method = prepared.method
+        if isinstance(method, ProcessMethod):
+            method.start()
         started_s, start = watch.elapsed_s(), time.perf_counter()
         candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
@@ -84,25 +89,32 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
-            figures=_figures(candidates, travels, reachable),
+            figures=_figures(candidates, travels, reachable)
+            | (method.take_figures() if isinstance(method, MeasuredMethod) else {}),
             ran=_used_software(settings.method_package, prepared),
         )
         status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report=report, folder=folder, watch=watch)
 
     def setup_key(self, settings: GraspSettings) -> tuple[Any, ...]:
-        """Returns robot, group and gripper joint."""
-        return settings.robot, settings.group, settings.gripper_joint
+        """Returns robot, group, gripper joint and method."""
+        return settings.robot, settings.group, settings.gripper_joint, settings.method, settings.method_parameters
 
     def prepare(self, settings: GraspSettings) -> _GraspSetup:
-        """Returns the robot with its inverse kinematics and hand."""
+        """Returns the robot with its inverse kinematics and hand, and the method."""
         robot = self.robot(settings.robot)
         group = robot.chain(settings.group)
         try:
             gripper = measure_gripper(robot.urdf, group.tip_link, settings.gripper_joint)
         except GripperGeometryError as error:
             raise ModeError(f"gripper_joint '{settings.gripper_joint}': {error}") from error
-        return _GraspSetup(robot, robot.solvers().solver(group.name), gripper)
+        method = load_method(settings.method, settings.method_parameters)
+        return _GraspSetup(robot, robot.solvers().solver(group.name), gripper, method)
+
+    def end(self, prepared: _GraspSetup) -> None:
+        """Ends the method's own process."""
+        if isinstance(prepared.method, ProcessMethod):
+            prepared.method.close()
 
 
 def _used_software(package: str, prepared: _GraspSetup) -> UsedSoftware:

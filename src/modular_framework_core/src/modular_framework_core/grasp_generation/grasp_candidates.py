@@ -120,6 +120,17 @@ class ConnectedMethod(Protocol):
 
 
 @runtime_checkable
+class ProcessMethod(Protocol):
+    """Additional interface of a grasp method with a process of its own."""
+
+    def start(self) -> None:
+        """Starts the process in advance, no effect while it runs; a fault is logged and raised by `candidates`."""
+
+    def close(self) -> None:
+        """Ends the process; may be called twice."""
+
+
+@runtime_checkable
 class MeasuredMethod(Protocol):
     """Additional interface of a grasp method that measures figures of its own."""
 
