@@ -7,6 +7,7 @@ They are chosen by name; a planner and a collision checker of the user's own, se
 from __future__ import annotations
 
 import re
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -24,6 +25,7 @@ from moveit_msgs.srv import (
     SetPlannerParams,
 )
 
+from mbf_method.errors import MethodFault
 from modular_framework_testing.planning.planning_wire import (
     ARM,
     GROUP,
@@ -48,11 +50,13 @@ ADAPTERS = " ".join(
     f"default_planner_request_adapters/{name}"
     for name in ("AddTimeOptimalParameterization", "FixStartStateBounds", "FixStartStateCollision")
 )
+FAULTY_PLANNER = ROOT / "tests/unit/mbf_method/faulty_planner.py"
 PARAMETERS = f"""<launch>
   <env name="PYTHONPATH" value="{{package}}/src:$(env PYTHONPATH)"/>
   <param name="move_group/collision_detector" value="my_checkers/Named"/>
   <rosparam ns="move_group/planning_pipelines">
     mine: {{{{planning_plugin: my_planners/OneStop}}}}
+    external: {{{{planning_plugin: mbf_method/ExternalPlanner, command: [{sys.executable}, {FAULTY_PLANNER}, raises]}}}}
     chomp: {{{{planning_plugin: chomp_interface/CHOMPPlanner}}}}
     wrong: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: Nonsense}}}}
     seeded: {{{{planning_plugin: ompl_interface/OMPLPlanner, request_adapters: {ADAPTERS}, seed: 5}}}}
@@ -100,6 +104,17 @@ def test_the_planner_of_the_guide_plans(session: Any) -> None:
     assert answer.error_code.val == OK, report["reason"]
     assert report["summary"].split()[0] in report["phases_s"] and report["checks"]["search"]["asked"] > 0
     assert motion(answer)[-1][1] == pytest.approx(list(POSITIONS), abs=1e-6)
+
+
+def test_a_planner_in_its_own_process_plans_and_its_fault_is_in_the_report(session: Any) -> None:
+    _, report = report_of(lambda: plan(request(GOAL, pipeline_id="external", planner_id="faulty")))
+    assert "the external planner failed: the function of the method raised ValueError" in report["reason"]
+    assert report["method_fault"] == MethodFault.RAISED
+    near = [JointConstraint(name, report["start"][name] + 0.01, 0.0, 0.0, 1.0) for name in ARM]
+    message = request(Constraints(joint_constraints=near), pipeline_id="external")
+    answer, report = report_of(lambda: plan(message))
+    assert answer.error_code.val == OK, report["reason"]
+    assert report["method_time_s"] > 0.0 and report["transport_time_s"] > 0.0 and "method_fault" not in report
 
 
 def reaches_tip_pose() -> bool:

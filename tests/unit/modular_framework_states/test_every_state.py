@@ -24,8 +24,8 @@ ROOT = Path(__file__).parents[3]
 STATES = ROOT / "src" / "modular_framework_states" / "src" / "modular_framework_states" / "states"
 EXAMPLES = ROOT / "docs" / "examples"
 CATALOGUE = StateCatalogue([STATES, EXAMPLES])
-METHOD = "my_grasp_method"  # an example that is no state
-NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_") and name != METHOD]
+METHODS = ("my_grasp_method", "my_planner")  # examples that are no states
+NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_") and name not in METHODS]
 EXPECTED = {
     "wait_for_signal",
     "select",

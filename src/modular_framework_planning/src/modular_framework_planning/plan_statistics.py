@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from modular_framework_ros.reported_figures import Figure
+
 NARROW_FRACTION = 0.5  # minimum fraction of checks in collision that indicates a narrow passage
 
 
@@ -87,6 +89,7 @@ class PlanStatistics:
         refusals: Pair of bodies with the most collisions; None without a collision.
         run: Resolved pipeline and planner; None if the request was rejected before planning.
         processor_s: Processor time of the plan [s]; independent of concurrent plans.
+        figures: Figures that the planner reports.
     """
 
     phases_s: Mapping[str, float] = field(default_factory=dict)
@@ -94,6 +97,7 @@ class PlanStatistics:
     refusals: Refusals | None = None
     run: PlannerRun | None = None
     processor_s: float = 0.0
+    figures: Mapping[Figure, float] = field(default_factory=dict)
 
     @property
     def summary(self) -> str:
@@ -123,4 +127,5 @@ class PlanStatistics:
             "refusals": None if self.refusals is None else asdict(self.refusals),
             "summary": self.summary,
             "run": None if self.run is None else asdict(self.run),
+            **{figure.name: value for figure, value in self.figures.items()},
         }

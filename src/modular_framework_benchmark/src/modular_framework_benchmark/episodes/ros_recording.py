@@ -30,12 +30,28 @@ from modular_framework_ros.reported_figures import (
     CLEARANCE,
     CONCURRENT,
     ERROR_CODE,
+    PLANNER_FAULT,
+    PLANNER_METHOD_TIME,
+    PLANNER_QUEUE_TIME,
+    PLANNER_TRANSPORT_TIME,
     PLANNING_TIME,
     PROCESSOR_TIME,
 )
 
 VARYING_PARAMETERS = ("run_id", "roslaunch", "seed")
 """Parameters that differ between episodes of the same configuration."""
+
+PLAN_FIGURES = (
+    ATTEMPTS,
+    CLEARANCE,
+    ERROR_CODE,
+    PLANNER_FAULT,
+    PLANNER_METHOD_TIME,
+    PLANNER_QUEUE_TIME,
+    PLANNER_TRANSPORT_TIME,
+    PROCESSOR_TIME,
+)
+"""Figures in the reports of move_group, by name."""
 
 TIME_TOLERANCE_S = 1e-6
 POSE_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
@@ -251,7 +267,7 @@ def _planning(samples: Samples, origin_s: float) -> list[dict[str, Any]]:
         concurrent_plans = sum(begin < wall and end > wall - wall_s for begin, end in spans)
         figures = {PLANNING_TIME.name: wall_s, CONCURRENT.name: max(concurrent_plans, 1)} | {
             figure.name: report[figure.name]
-            for figure in (CLEARANCE, ATTEMPTS, PROCESSOR_TIME, ERROR_CODE)
+            for figure in PLAN_FIGURES
             if isinstance(report.get(figure.name), int | float)
         }
         times_s = (report.get("started", report["time"]) - origin_s, report["time"] - origin_s)

@@ -7,7 +7,16 @@ import math
 
 from modular_framework_benchmark.metrics import motion_figures
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, Motion
-from modular_framework_ros.reported_figures import CLEARANCE, CONCURRENT, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME
+from modular_framework_ros.reported_figures import (
+    CLEARANCE,
+    CONCURRENT,
+    PLANNER_METHOD_TIME,
+    PLANNER_QUEUE_TIME,
+    PLANNER_TRANSPORT_TIME,
+    PLANNING_TIME,
+    PROCESSOR_TIME,
+    SEARCH_TIME,
+)
 
 
 def _motions(episode: EpisodeMeasurements) -> list[Motion]:
@@ -49,6 +58,21 @@ def concurrent_plans(episode: EpisodeMeasurements) -> float | None:
 def search_time(episode: EpisodeMeasurements) -> float | None:
     """Mean time until a path was found, before shortening, timing and checks, if the planner reports it [s]."""
     return _mean(episode.values_of(SEARCH_TIME))
+
+
+def planner_method_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean time of an external planner's function [s]; none for other planners."""
+    return _mean(episode.values_of(PLANNER_METHOD_TIME))
+
+
+def planner_queue_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean time for which a plan waits for other plans of the same external planner [s]."""
+    return _mean(episode.values_of(PLANNER_QUEUE_TIME))
+
+
+def planner_transport_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean time to exchange messages with an external planner [s]."""
+    return _mean(episode.values_of(PLANNER_TRANSPORT_TIME))
 
 
 def planning_success(episode: EpisodeMeasurements) -> float | None:

@@ -8,9 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from modular_framework_benchmark.episodes.snapshot import MachineLoad, common_parts
+from modular_framework_benchmark.metrics.failure_classes import failure_class
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.metrics.registry import MetricError, measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.results import FAILURE_CLASS
+
+CLASSIFIED_COMPONENTS = ("generation", "planning")
+"""Components whose failures have a class."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,9 @@ def measured_record(
         measured = measure(spec.settings.metrics, measurements)
     except MetricError as error:
         return broken_record(spec, str(error), watch)
+    failure = None
+    if report.component in CLASSIFIED_COMPONENTS:
+        failure = failure_class(measurements, task_succeeded=False)
     span = Span(
         "component",
         report.component,
@@ -98,6 +106,7 @@ def measured_record(
             **common_parts(spec, watch.load),
             **report.ran.as_json(),
             **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
+            **({FAILURE_CLASS: failure.value} if failure is not None else {}),
         },
         folder=str(folder),
     )

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs planners on sets of motion planning problems, without simulation and without a ROS master.
 
-Each plan runs in a forked process with the same initial state, so that a seed reproduces it bit for bit.
+Each plan runs in a forked process with the same initial state, so that a seed reproduces it bit for bit. A planner with
+a process of its own plans in that process, which the seed reaches with the request.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ PLUGINS = {  # defaults for pipelines without a configuration
     "ompl": "ompl_interface/OMPLPlanner",
     "pilz_industrial_motion_planner": "pilz_industrial_motion_planner/CommandPlanner",
     "stomp": "stomp_moveit/StompPlannerManager",
+    "external": "mbf_method/ExternalPlanner",
 }
 
 
@@ -82,6 +84,8 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]
         started_s, response, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         statistics: PlanStatistics | None = None
         try:
+            prepared.pipeline.start()
+            started_s = watch.elapsed_s()
             response = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
             statistics = response.statistics
         except PlanningError as error:
@@ -98,7 +102,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]
             started_s=started_s,
             ended_s=ended_s,
             wall_s=ended_s - started_s,
-            figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
+            figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s, **statistics.figures})
             | (_figures(problem, response, settings) if response is not None else {}),
             motion=_motion(response.trajectory) if response is not None else None,
             ran=_used_software(statistics, self.robot(settings.robot)),
@@ -120,8 +124,9 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[PlanningSettings, _PlanningSetup]
         return _PlanningSetup(robot.model, pipeline, seeded)
 
     def end(self, prepared: _PlanningSetup) -> None:
-        """Ends the planning process."""
+        """Ends the planning process and the planner's own process."""
         prepared.seeded.close()
+        prepared.pipeline.close()
 
 
 def pipeline_spec(robot: Robot, settings: PlanningSettings) -> PipelineSpec:

@@ -86,7 +86,9 @@ def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Dige
         yield f"package {package}", functools.partial(_package_digests, package)
     files = [*settings.files, *metric_files(settings.metrics)]
     if isinstance(settings, PlanningSettings):
-        files += [Path(settings.problem.scene), Path(settings.problem.request)]
+        files += [Path(settings.problem.scene), Path(settings.problem.request), *_named_files(settings.parameters)]
+    if isinstance(settings, GraspSettings):
+        files += _named_files(settings.method_parameters)
     for file in files:
         yield f"file {file}", functools.partial(_file_digests, file, "")
     if isinstance(settings, ModelSettings):
@@ -165,6 +167,11 @@ def _stack_digests(stack: StackPreview, changed: Mapping[str, Any]) -> Digests:
         folders = [Path(entry) for entry in str(stack.launch.arguments.get(name, "")).split(os.pathsep) if entry]
         if folders:
             yield f"folder {name}", tree_digest([folder for folder in folders if folder.is_dir()])
+
+
+def _named_files(parameters: Mapping[str, Any]) -> list[Path]:
+    """Returns the existing files that parameters name by path, such as the program of a method."""
+    return [Path(text) for text in _path_texts(parameters) if text.startswith("/") and Path(text).is_file()]
 
 
 def _path_texts(value: Any) -> Iterator[str]:

@@ -27,7 +27,7 @@ class ExperimentResults:
             `worker`; a column named after each factor with the labels of the levels; a column named after each metric
             (float, NaN without a value; 0 and 1 for a rate); in the mode `planning` also `drawn_problem`, a text that
             identifies the problem. `cold_start` (bool) marks the first episode of a stack; without the column, no
-            episode is marked. `failure_class` is the class of a failed episode in the mode `task`, otherwise "".
+            episode is marked. `failure_class` is the class of a failed episode, "" in the mode `kinematics`.
         spans: A row per span, with the columns `number` (of the episode), `kind`, `name`, `started_s`, `ended_s`,
             `outcome`, `failed`, `reason`.
         planned: Total number of episodes, finished or not.

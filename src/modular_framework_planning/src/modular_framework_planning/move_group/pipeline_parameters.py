@@ -85,27 +85,31 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
     def plan(self, request: PlanningRequest) -> PlanningResult:
         """Plans with the requested pipeline; seeded requests are planned in a worker process."""
         pipeline = self.choose(request.pipeline_id)
-        request = self._with_launch_seed(request)
+        request = self._with_launch_seed(request, pipeline.has_own_process)
         seed = pipeline.settings.seed if request.seed is None else request.seed
         return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
 
-    def _with_launch_seed(self, request: PlanningRequest) -> PlanningRequest:
-        """Derives a seed from /seed for a request without a seed, and bounds its searches by iterations."""
+    def _with_launch_seed(self, request: PlanningRequest, has_own_process: bool) -> PlanningRequest:
+        """Derives a seed from /seed for a request without a seed, and bounds searches of this node by iterations."""
         seed = launch_seed() if request.seed is None else None
         if seed is None:
             return request
         digest = request_digest(request)
         repetition = self._request_counts.count(digest, rospy.get_time())
+        request = replace(request, seed=derived_seed(seed, "planning", digest, repetition))
+        if has_own_process:
+            return request
         return replace(
             request,
-            seed=derived_seed(seed, "planning", digest, repetition),
             max_iterations=max(1, int(SEEDED_ITERATIONS_PER_S * request.allowed_time_s)),
             allowed_time_s=CLOCK_MARGIN * request.allowed_time_s,
         )
 
     def close(self) -> None:
-        """Stops the worker processes."""
+        """Stops the worker processes and the processes of planners."""
         self._seeded.close()
+        for pipeline in self._loaded.values():
+            pipeline.close()
 
     def choose(self, name: str) -> PlanningPipeline:
         """Returns a pipeline, the default pipeline for an empty name; raises PlanningError for an unknown name."""
@@ -152,13 +156,16 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
     seeded = SeededPlanning(model, specs)
     if launch_seed() is not None or any(pipeline.settings.seed is not None for pipeline in loaded.values()):
         threading.Thread(target=_start, args=(seeded,), daemon=True).start()
+    for pipeline in loaded.values():
+        if pipeline.has_own_process:
+            threading.Thread(target=_start, args=(pipeline,), daemon=True).start()
     return PipelineSet(loaded, default, refused, seeded)
 
 
-def _start(seeded: SeededPlanning) -> None:
-    """Starts the worker process in advance; a failure is logged here and raised again by the first request."""
+def _start(planning: SeededPlanning | PlanningPipeline) -> None:
+    """Starts a process in advance; a failure is logged here and raised again by the first request."""
     try:
-        seeded.start()
+        planning.start()
     except PlanningError as error:
         rospy.logerr("%s", error.reason)
 

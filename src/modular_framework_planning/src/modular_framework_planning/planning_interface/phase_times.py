@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.kernels.compiled_collision import CHECK_COUNTS
 from modular_framework_planning.plan_statistics import CheckCounts, PlannerRun, PlanStatistics
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CountsChecks
+from modular_framework_ros.reported_figures import Figure
 
 SETUP, GOALS, SEARCH, REPAIR, SHORTENING, TIMING, CHECK = (
     "setup",
@@ -29,6 +30,11 @@ SETUP, GOALS, SEARCH, REPAIR, SHORTENING, TIMING, CHECK = (
 class PhaseTimes:
     """Sums the durations and collision checks per phase; a nested phase does not count for its enclosing phase.
 
+    Attributes:
+        run: Resolved pipeline and planner.
+        figures: Figures that the planner reports.
+        remote_processor_s: Processor time of other processes [s].
+
     Args:
         processor_clock: Returns the processor time of the planning thread or process [s].
     """
@@ -40,6 +46,8 @@ class PhaseTimes:
         self._checker: CountsChecks | None = None
         self._counts = np.zeros(CHECK_COUNTS, np.int64)  # the checker updates this object in place
         self.run: PlannerRun | None = None
+        self.figures: dict[Figure, float] = {}
+        self.remote_processor_s = 0.0
         self._nested_s = [0.0]  # total time of the nested phases, per open phase
         self._nested_checks = [np.zeros(CHECK_COUNTS, np.int64)]
 
@@ -70,13 +78,16 @@ class PhaseTimes:
 
     def statistics(self) -> PlanStatistics:
         """Returns the statistics so far."""
-        processor_s = self._processor_clock() - self._processor_start_s
+        processor_s = self._processor_clock() - self._processor_start_s + self.remote_processor_s
+        figures = dict(self.figures)
         if self._checker is None:
-            return PlanStatistics(dict(self.seconds), run=self.run, processor_s=processor_s)
+            return PlanStatistics(dict(self.seconds), run=self.run, processor_s=processor_s, figures=figures)
         counts = {}
         for phase, row in self._checks.items():
             checked, free, touching, states, exactly = row.tolist()
             if checked:
                 undecided = checked - free - touching
                 counts[phase] = CheckCounts(checked, free, touching, undecided, exactly, states)
-        return PlanStatistics(dict(self.seconds), counts, self._checker.most_frequent_contact(), self.run, processor_s)
+        return PlanStatistics(
+            dict(self.seconds), counts, self._checker.most_frequent_contact(), self.run, processor_s, figures
+        )

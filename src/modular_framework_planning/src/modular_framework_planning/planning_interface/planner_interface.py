@@ -277,6 +277,8 @@ class Planner(ABC):
             with a warning, as in OMPL's planning contexts, or raises an error.
         repairs_edges: Whether `repair_path` is implemented. Without it, an invalid motion is a failure of the planner.
         collision_code: Error code for a start or goal in collision; None for the usual code.
+        has_own_process: Whether the planner runs in a process of its own, which forked processes cannot share. Its
+            plans repeat under a seed only if that process respects the seed.
     """
 
     description: str = ""
@@ -287,6 +289,7 @@ class Planner(ABC):
     replaces_bad_values: bool = True
     repairs_edges: bool = False
     collision_code: ErrorCode | None = None
+    has_own_process: bool = False
 
     @classmethod
     def configure(cls, model: RobotModel, settings: PipelineSettings) -> Planner:  # noqa: ARG003
@@ -300,6 +303,18 @@ class Planner(ABC):
             PlanningError: A parameter of the planner is invalid.
         """
         return cls()
+
+    def start(self) -> None:
+        """Starts the planner's own process in advance; no effect while it runs.
+
+        Raises:
+            PlanningError: The process does not start.
+        """
+        return
+
+    def close(self) -> None:
+        """Ends the planner's own process; may be called twice."""
+        return
 
     @staticmethod
     def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:  # noqa: ARG004

@@ -98,6 +98,19 @@ class PlanningPipeline:
         """Names of path constraints that are planner inputs and do not constrain the motion."""
         return self._planner.auxiliary_constraints
 
+    @property
+    def has_own_process(self) -> bool:
+        """Whether the planner runs in a process of its own; see `Planner`."""
+        return self._planner.has_own_process
+
+    def start(self) -> None:
+        """Starts the planner's own process in advance; raises PlanningError if it does not start."""
+        self._planner.start()
+
+    def close(self) -> None:
+        """Ends the planner's own process; may be called twice."""
+        self._planner.close()
+
     def group_planners(self, group: str) -> tuple[str, ...]:
         """Returns the planner_configs of a group, without those whose planner does not exist."""
         names = [str(name) for name in self.settings.groups.get(group, {}).get("planner_configs") or ()]

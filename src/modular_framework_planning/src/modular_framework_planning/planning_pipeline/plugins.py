@@ -18,6 +18,7 @@ PLANNERS = {
     "ompl_interface/OMPLPlanner": f"{PACKAGE}.planners.ompl.planner/OmplPlanner",
     "pilz_industrial_motion_planner/CommandPlanner": f"{PACKAGE}.planners.pilz.command_planner/CommandPlanner",
     "stomp_moveit/StompPlannerManager": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
+    "mbf_method/ExternalPlanner": f"{PACKAGE}.planners.external.planner/ExternalPlanner",
     "stomp_moveit/StompPlanner": f"{PACKAGE}.planners.stomp.planner/StompPlanner",
 }
 ADAPTERS = (

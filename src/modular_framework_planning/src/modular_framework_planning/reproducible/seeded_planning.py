@@ -20,6 +20,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.planning_request import PlanningRequest, PlanningResult
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.plugins import planner_class
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.reproducible.seeded_worker import WorkerSetup
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -36,7 +37,10 @@ def _never_cancelled() -> bool:
 
 
 class SeededPlanning:
-    """Client of the worker process, which is started by the first request; thread-safe."""
+    """Client of the worker process, which is started by the first request; thread-safe.
+
+    Planners with a process of their own plan there, with the seed in the request.
+    """
 
     def __init__(self, model: RobotModel, specs: Sequence[PipelineSpec]) -> None:
         """Stores the setup of the worker.
@@ -45,7 +49,8 @@ class SeededPlanning:
             model: Robot model.
             specs: Specifications of the pipelines.
         """
-        self._model, self._specs = model, tuple(specs)
+        self._model = model
+        self._specs = tuple(spec for spec in specs if not planner_class(spec.planner).has_own_process)
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -64,6 +69,8 @@ class SeededPlanning:
         """
         if seed < 0:
             raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; it must be at least 0")
+        if pipeline.has_own_process:
+            return pipeline.plan(replace(request, seed=seed), repeatable=True)
         connection = self._connect()
         try:
             configurations = pipeline.configurations.snapshot()
@@ -89,9 +96,12 @@ class SeededPlanning:
         return result
 
     def start(self) -> None:
-        """Starts the worker process and waits until it is ready; raises PlanningError if it does not start."""
+        """Starts the worker process and waits until it is ready; raises PlanningError if it does not start.
+
+        No effect if all planners have a process of their own.
+        """
         with self._lock:
-            if self._process is not None and self._process.poll() is None:
+            if not self._specs or (self._process is not None and self._process.poll() is None):
                 return
             self._stop()
             self._folder = tempfile.TemporaryDirectory(prefix="seeded_planning_")

@@ -92,6 +92,12 @@ class PlannerConformance:
     def setup_method(self) -> None:
         """Runs before each test."""
         self.model = RobotModel(URDF, SRDF, LIMITS)
+        self._pipelines: list[PlanningPipeline] = []
+
+    def teardown_method(self) -> None:
+        """Runs after each test: ends the planner's own processes."""
+        for pipeline in self._pipelines:
+            pipeline.close()
 
     def test_a_free_motion_joins_start_and_goal_within_the_limits(self) -> None:
         """The motion begins at the start, ends at the goal, and keeps velocities and accelerations."""
@@ -148,9 +154,9 @@ class PlannerConformance:
 
     def _pipeline(self) -> PlanningPipeline:
         settings = PipelineSettings(parameters=dict(self.parameters), robot_planning=_ROBOT_PLANNING)
-        return PipelineSpec("tested", self.plugin, self.adapters, settings).build(
-            self.model, KinematicsPool(self.model)
-        )
+        spec = PipelineSpec("tested", self.plugin, self.adapters, settings)
+        self._pipelines.append(spec.build(self.model, KinematicsPool(self.model)))
+        return self._pipelines[-1]
 
     def _request(
         self,
