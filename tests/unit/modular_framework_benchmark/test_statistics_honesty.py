@@ -46,6 +46,14 @@ def test_a_rule_that_claims_too_much_and_an_interval_that_holds_too_little_are_f
     ]
 
 
+def test_half_a_deviation_that_is_shown_in_73_percent_of_experiments_is_too_little() -> None:
+    (half,) = [each for each in conditions.CONDITIONS if "half a deviation of the differences" in each.name]
+    assert [each.passed for each in conditions.rows_of(half, Counter(hit=292, no=108))] == [False]
+    assert [each.passed for each in conditions.rows_of(half, Counter(hit=300, no=100))] == [True]
+    for success in (each for each in conditions.CONDITIONS if each.kind == "power" and each is not half):
+        assert [each.passed for each in conditions.rows_of(success, Counter(hit=292, no=108))] == [True]
+
+
 def test_the_enumerated_coverage_and_false_claims_are_sums_over_the_outcomes() -> None:
     pairs, won, lost = 7, 0.3, 0.15
     point = int(np.flatnonzero((enumerated.grid() == (won, lost)).all(axis=1))[0])
