@@ -15,7 +15,7 @@ from reported_experiment import ReportedExperiment
 
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
-from modular_framework_benchmark.records.results import COLD_START
+from modular_framework_benchmark.records.results import COLD_START, WORKER_COUNT
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_ros.reported_figures import Clock
 
@@ -116,7 +116,9 @@ def test_a_planner_that_got_worse_is_found_and_fails_the_comparison(
     assert not re.match(r"\d+ metrics of methods got worse, 0 better", capsys.readouterr().out)
 
 
-def stored_with_block(path: Path, block: int, delay_s: float = 0.0, *, starts_known: bool = True) -> str:
+def stored_with_block(
+    path: Path, block: int, delay_s: float = 0.0, *, starts_known: bool = True, workers: int = 0
+) -> str:
     """Stores an experiment whose planning takes 0.1 s longer in the first episode of a stack, as after a cold start.
 
     Args:
@@ -124,6 +126,7 @@ def stored_with_block(path: Path, block: int, delay_s: float = 0.0, *, starts_kn
         block: Trials for which a stack is kept; the next trial has another method, and then a stack of its own.
         delay_s: Time that planning takes longer in every episode [s].
         starts_known: Whether the records say which episodes were the first of their stack.
+        workers: Workers on the machine; 0: the records do not say.
     """
     description = RUN.description()
     timed = tuple(
@@ -137,6 +140,7 @@ def stored_with_block(path: Path, block: int, delay_s: float = 0.0, *, starts_kn
             cold = record.spec.trial % block == 0
             planning_s = 0.2 + 0.1 * cold + delay_s + noise.normal(0.0, 0.01)
             snapshot = {**record.snapshot, **({COLD_START: True} if cold and starts_known else {})}
+            snapshot |= {WORKER_COUNT: workers} if workers else {}
             metrics = {**record.metrics, "planning_time": planning_s}
             database.write(number, replace(record, metrics=metrics, snapshot=snapshot))
     return str(path)
@@ -157,6 +161,21 @@ def test_cold_and_warm_starts_mixed_would_show_a_change_and_a_slower_planner_doe
     assert compare([before, mixed, "--fail-on-regression"]) == 1
     slower = stored_with_block(tmp_path / "slower.db", 2, 0.05)
     assert compare([stored_with_block(tmp_path / "known.db", 5), slower, "--fail-on-regression"]) == 1
+
+
+def test_the_same_code_with_more_workers_shows_no_change_of_real_times(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    alone = stored_with_block(tmp_path / "alone.db", 5, workers=1)
+    crowded = stored_with_block(tmp_path / "crowded.db", 5, 0.1, workers=4)
+    assert compare([alone, crowded, "--fail-on-regression"]) == 0, capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "worker_count: before 1; after 4" in said
+    assert "episodes with the same number of workers on the machine: 1 before, 4 after." in said
+    assert "nothing to compare in" in said
+    slower = stored_with_block(tmp_path / "slower.db", 5, 0.1, workers=1)
+    unknown = stored_with_block(tmp_path / "unknown.db", 5, 0.1)
+    assert compare([alone, slower, "--fail-on-regression"]) == compare([alone, unknown, "--fail-on-regression"]) == 1
 
 
 def test_a_report_says_how_many_episodes_were_the_first_of_their_stack(tmp_path: Path) -> None:

@@ -259,6 +259,15 @@ def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_p
     assert "8 attempts ended without a record, and the episodes ran again: begun 2026-11-26 on lab-1" in text
 
 
+def test_a_report_warns_of_real_times_beside_other_workers_of_the_run(tmp_path: Path) -> None:
+    text = warnings(stored(tmp_path / "results.db", worker_count=2, workers_share=0.45))
+    assert text == (
+        "8 episodes ran beside other workers of the run that used up to 45 % of the machine, which lengthens real "
+        "times (planning_time)."
+    )
+    assert warnings(stored(tmp_path / "many_cores.db", worker_count=2, workers_share=0.02)) == ""
+
+
 def test_a_quiet_machine_gives_no_warning_and_the_report_shows_its_load(tmp_path: Path) -> None:
     path = stored(tmp_path / "results.db", [0.02, 0.02, 0.02, 0.02, 0.02, 0.03, 0.08, 0.08])
     assert warnings(path) == ""
@@ -283,6 +292,21 @@ def test_the_load_counts_other_processes_and_not_those_of_the_run(monkeypatch: p
 
     assert share_of("another/worker/") > 0.0
     assert share_of("mine/other/") == 0.0
+
+
+def test_the_time_of_the_other_workers_of_the_run_is_recorded_with_their_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(RUN_ID_VARIABLE, "mine/other/")
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
+        monkeypatch.setenv(RUN_ID_VARIABLE, "mine/worker/")
+        before, end = MachineLoad.now(), time.monotonic() + 30.0
+        while (load := MachineLoad.now()).workers_s["other"] < before.workers_s["other"] + 0.2:
+            assert time.monotonic() < end
+        busy.kill()
+    measured = load.since(before)
+    assert measured["workers_share"] > 0.0 and measured["worker_count"] == 2
+    assert MachineLoad.now().since(MachineLoad.now())["worker_count"] == 1
 
 
 def test_a_process_of_the_run_whose_program_is_being_loaded_does_not_count_as_load(

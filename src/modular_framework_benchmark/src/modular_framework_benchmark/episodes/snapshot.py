@@ -22,6 +22,7 @@ import rospkg
 
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import as_json
+from modular_framework_benchmark.records.results import WORKER_COUNT
 from modular_framework_core.launching.launch_session import environment_of
 
 RECORDED_PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
@@ -119,6 +120,7 @@ class MachineLoad:
         busy_s: Busy time of the processors [s].
         stolen_s: Processor time that the hypervisor gave to other machines [s].
         others_s: Processor time of each process outside this run [s], keyed by process id.
+        workers_s: Processor time of each other worker of this run on this machine [s], keyed by the worker's mark.
     """
 
     time_s: float
@@ -126,17 +128,23 @@ class MachineLoad:
     busy_s: float
     stolen_s: float
     others_s: Mapping[int, float]
+    workers_s: Mapping[str, float]
 
     @classmethod
     def now(cls) -> MachineLoad:
         """Reads the counters."""
         times = psutil.cpu_times()
         busy_s = times.user + times.nice + times.system + times.irq + times.softirq + times.steal
-        return cls(time.monotonic(), os.getloadavg()[0], busy_s, times.steal, _others_s())
+        return cls(time.monotonic(), os.getloadavg()[0], busy_s, times.steal, *_processor_times())
 
     def since(self, before: MachineLoad) -> dict[str, float]:
-        """Returns the load since an earlier moment; `others_share` is the machine fraction used by other processes."""
+        """Returns the load since an earlier moment.
+
+        `others_share` is the fraction of the machine that processes outside this run used, and `workers_share` the
+        fraction that the other workers of this run used.
+        """
         others_s = sum(max(spent - before.others_s.get(pid, 0.0), 0.0) for pid, spent in self.others_s.items())
+        workers_s = sum(max(spent - before.workers_s.get(mark, 0.0), 0.0) for mark, spent in self.workers_s.items())
         available_s = max(self.time_s - before.time_s, 1e-3) * len(os.sched_getaffinity(0))
         return {
             "load_before": before.load_1_min,
@@ -144,6 +152,8 @@ class MachineLoad:
             "stolen_s": round(self.stolen_s - before.stolen_s, 2),
             "busy_s": round(self.busy_s - before.busy_s, 2),
             "others_share": round(others_s / available_s, 3),
+            "workers_share": round(workers_s / available_s, 3),
+            WORKER_COUNT: 1 + max(len(before.workers_s), len(self.workers_s)),
         }
 
 
@@ -164,21 +174,39 @@ def common_parts(spec: EpisodeSpec, load: MachineLoad) -> dict[str, Any]:
     }
 
 
-def _others_s() -> dict[int, float]:
-    """Returns the processor time of each process outside this run [s], keyed by process id."""
-    excluded, times_s = {os.getpid(), os.getppid()}, {}
-    run = f"{RUN_ID_VARIABLE}={os.environ.get(RUN_ID_VARIABLE, '').partition('/')[0]}".encode()
+def _processor_times() -> tuple[dict[int, float], dict[str, float]]:
+    """Returns the fields `others_s` and `workers_s` of `MachineLoad`.
+
+    The time of a worker includes its ended processes, such as the processes that each compute one plan.
+    """
+    excluded, others_s, workers_s = {os.getpid(), os.getppid()}, dict[int, float](), dict[str, float]()
+    own_run, own_worker = _run_and_worker(os.environ.get(RUN_ID_VARIABLE, ""))
     for process in psutil.process_iter():
         with contextlib.suppress(OSError, psutil.Error):  # the process has ended
-            if process.pid not in excluded and not _is_of_run(Path(f"/proc/{process.pid}"), run):
-                times = process.cpu_times()
-                times_s[process.pid] = times.user + times.system
-    return times_s
+            run, worker = _run_and_worker(_mark(Path(f"/proc/{process.pid}")))
+            times = process.cpu_times()
+            if process.pid in excluded or (run and (run, worker) == (own_run, own_worker)):
+                continue
+            if run and run == own_run:
+                used_s = times.user + times.system + times.children_user + times.children_system
+                workers_s[worker] = workers_s.get(worker, 0.0) + used_s
+            else:
+                others_s[process.pid] = times.user + times.system
+    return others_s, workers_s
 
 
-def _is_of_run(process_folder: Path, run: bytes) -> bool:
+def _run_and_worker(mark: str) -> tuple[str, str]:
+    """Returns the run and the worker of a mark RUN/WORKER/; empty texts without a mark."""
+    run, _, rest = mark.partition("/")
+    return run, rest.partition("/")[0]
+
+
+def _mark(process_folder: Path) -> str:
+    """Returns the mark in the environment of a process; "" without a mark, or for the process of a different user."""
     try:
         environment = environment_of(process_folder)
-    except PermissionError:  # the process of a different user
-        return False
-    return any(variable.startswith(run) for variable in environment.split(b"\0"))
+    except PermissionError:
+        return ""
+    prefix = f"{RUN_ID_VARIABLE}=".encode()
+    marks = (variable for variable in environment.split(b"\0") if variable.startswith(prefix))
+    return next(marks, b"").removeprefix(prefix).decode(errors="replace")

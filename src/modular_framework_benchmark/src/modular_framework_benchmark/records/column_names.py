@@ -11,7 +11,7 @@ SUCCESS = "success"
 RESULT_COLUMNS = frozenset(
     (
         "number trial seed status outcome cause begun wall_s simulated_s folder worker drawn_problem cold_start "
-        "failure_class"
+        "worker_count failure_class"
     ).split()
 )
 """Columns of the result table of every experiment; factors and metrics must not use these names."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 
-from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
+from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS, WORKER_COUNT
 
 
 class PartKind(Enum):
@@ -26,12 +26,20 @@ _PARTS: Mapping[PartKind, tuple[str, ...]] = {
         *("version", "git_revision", "git_changed", "python", "ros_distribution"),
         *("packages", "ros_packages", "environment", "methods", "machine"),
     ),
-    PartKind.CONTENT: ("planners", "controllers", "physics_engine", "renderer", "digests"),
-    PartKind.NOTE: ("solver", "substitutions", "replaced", "shake_fault", "video_fault", "recording_fault"),
+    PartKind.CONTENT: ("planners", "collision_checker", "controllers", "physics_engine", "renderer", "digests"),
+    PartKind.NOTE: (
+        WORKER_COUNT,
+        "solver",
+        "substitutions",
+        "replaced",
+        "shake_fault",
+        "video_fault",
+        "recording_fault",
+    ),
     PartKind.SETTING: (SETTINGS,),
     PartKind.MEASURED: (
         *("metric_faults", "earlier_tries", REFERENCE),
-        *("load_before", "load_after", "stolen_s", "busy_s", "others_share"),
+        *("load_before", "load_after", "stolen_s", "busy_s", "others_share", "workers_share"),
     ),
     PartKind.VARYING: ("seed", "parameters", "final_objects", "world_digest", COLD_START, FAILURE_CLASS),
 }

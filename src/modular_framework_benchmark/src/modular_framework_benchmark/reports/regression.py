@@ -14,7 +14,7 @@ from enum import Enum
 import pandas as pd
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
-from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, WORKER_COUNT, ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
@@ -117,6 +117,12 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
             "Metrics in real or processor time are compared only between two first episodes of their stacks or two "
             "later episodes."
         )
+    counts_of_workers = [_worker_counts(results) for results in (before, after)]
+    if all(counts_of_workers) and counts_of_workers[0] != counts_of_workers[1]:
+        notes.append(
+            "Metrics in real or processor time are compared only between episodes with the same number of workers on "
+            f"the machine: {' and '.join(counts_of_workers[0])} before, {' and '.join(counts_of_workers[1])} after."
+        )
     for method in methods:
         merged = _merged_results(before, after, method, metrics, method_confidence)
         comparisons = {item.metric: item for item in compare(merged)}
@@ -130,6 +136,13 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
         else "No two episodes have the same method, levels, trial and seed: episodes are paired at random."
     )
     return Regression(before.description, after.description, tuple(changes), confidence, tuple(notes))
+
+
+def _worker_counts(results: ExperimentResults) -> list[str]:
+    """Returns the known numbers of workers of the episodes."""
+    if WORKER_COUNT not in results.episodes:
+        return []
+    return [str(count) for count in sorted(results.episodes[WORKER_COUNT].unique()) if count]
 
 
 def _levels(description: ExperimentDescription) -> tuple[str, ...]:

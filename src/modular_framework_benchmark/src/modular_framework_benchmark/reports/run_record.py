@@ -161,19 +161,25 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
 
 def others_fractions(snapshots: SnapshotValues) -> list[float]:
     """Returns the fraction of the machine that other processes used during each episode that recorded the load."""
-    recorded = snapshots.get("others_share", ())
+    return _fractions(snapshots, "others_share")
+
+
+def _fractions(snapshots: SnapshotValues, part: str) -> list[float]:
+    recorded = snapshots.get(part, ())
     return [float(value) for value, episodes in recorded for _ in range(episodes)]
 
 
 def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iterator[str]:
-    fractions = others_fractions(snapshots)
-    busy = sum(fraction > MAX_OTHERS_FRACTION for fraction in fractions)
+    """Yields the warnings of real times that other processes or other workers of the run lengthened."""
     names = [metric.name for metric in results.description.metrics if metric.clock is Clock.WALL]
-    if busy and names:
-        yield (
-            f"{count_phrase(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions):.0f} % "
-            f"of the machine, which lengthens real times ({', '.join(names)})."
-        )
+    for part, users in (("others_share", "other processes"), ("workers_share", "other workers of the run")):
+        fractions = _fractions(snapshots, part)
+        busy = sum(fraction > MAX_OTHERS_FRACTION for fraction in fractions)
+        if busy and names:
+            yield (
+                f"{count_phrase(busy, 'episode')} ran beside {users} that used up to {100 * max(fractions):.0f} % "
+                f"of the machine, which lengthens real times ({', '.join(names)})."
+            )
 
 
 def differences_of(before: CombinationSnapshots, after: CombinationSnapshots) -> tuple[str, ...]:

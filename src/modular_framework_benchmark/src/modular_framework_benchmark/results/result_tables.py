@@ -13,7 +13,7 @@ from sqlalchemy import Connection, Select, case, column, func, select, table
 from modular_framework_benchmark.experiments.modes import MODES, stored_settings
 from modular_framework_benchmark.records.column_names import SUCCESS
 from modular_framework_benchmark.records.experiment import ExperimentDescription
-from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS, ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS, WORKER_COUNT, ExperimentResults
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
 
@@ -74,6 +74,8 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
         problems = [stored_settings(description.mode, json.loads(text)).drawn_problem for text in columns["settings"]]
         frame["drawn_problem"] = pd.Series(problems, dtype="str")
     frame[COLD_START] = frame["number"].isin(_snapshot_parts(connection, number, COLD_START))
+    workers = _snapshot_parts(connection, number, WORKER_COUNT)
+    frame[WORKER_COUNT] = pd.Series([workers.get(each, 0) for each in columns["number"]], dtype="int64")
     failures = _snapshot_parts(connection, number, FAILURE_CLASS)
     frame[FAILURE_CLASS] = pd.Series([failures.get(each, "") for each in columns["number"]], dtype="str")
     return pd.DataFrame(frame)

@@ -129,7 +129,8 @@ class PairCounts:
         failed: Compared episodes that rank worse than any value.
         broken: Compared episodes that are broken or invalid.
         missing: Pairs excluded because an episode has no value of the metric.
-        unlike: Pairs excluded from a real or processor time because only one episode is the first of its stack.
+        unlike: Pairs excluded from a real or processor time because only one episode is the first of its stack,
+            or because the numbers of workers differ.
         unmatched: Finished episodes without a finished or planned partner.
         at_random: Whether pairs share only their levels, because no trial occurs in both methods.
     """

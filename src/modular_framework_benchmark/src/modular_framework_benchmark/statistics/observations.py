@@ -12,7 +12,8 @@ This module defines the value of an episode that failed, timed out, broke or lac
 - Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
   Missing values are excluded from the figures and counted.
 
-Real and processor times are compared only between two first episodes of their stacks or two later episodes.
+Real and processor times are compared only between two first episodes of their stacks or two later episodes, and only
+between episodes with the same number of workers on the machine.
 
 The module also defines the independent units: episodes that share a drawn problem or seed belong to one unit.
 """
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.experiment import Direction, Factor, Metric, MetricKind
-from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, WORKER_COUNT, ExperimentResults
 from modular_framework_benchmark.statistics.comparison import EpisodeCounts
 
 SUCCESS = Metric("success", "task", MetricKind.RATE, Direction.HIGHER, description="The episode succeeded.")
@@ -73,7 +74,8 @@ class Pairs:
         first: Observations of the first method.
         second: Observations of the second method, in the order of their partners.
         missing: Number of pairs excluded because a value is missing.
-        unlike: Number of pairs excluded because only one episode is the first of its stack.
+        unlike: Number of pairs excluded because only one episode is the first of its stack, or because the numbers of
+            workers differ.
         unmatched: Number of episodes without a partner.
         at_random: Whether partners share only the levels of the other factors.
     """
@@ -177,6 +179,8 @@ class EpisodeTable:
         self._broken = np.isin(self._statuses, [status.value for status in UNMEASURED_STATUSES])
         first_of_stack = episodes[COLD_START] if COLD_START in episodes else np.zeros(len(episodes), dtype=bool)
         self._first_of_stack = np.asarray(first_of_stack, dtype=bool)
+        workers = episodes[WORKER_COUNT] if WORKER_COUNT in episodes else np.zeros(len(episodes), dtype=np.int64)
+        self._workers = np.asarray(workers, dtype=np.int64)
         self._strata = _strata(results)
         self._units, self.unit_noun = _units(results, self._strata)
         trials = episodes["trial"].to_numpy(np.int64)
@@ -237,11 +241,23 @@ class EpisodeTable:
         count = len(paired[0])
         alike = np.ones(count, dtype=bool)
         if metric.depends_on_machine:
-            alike = self._first_of_stack[paired[0]] == self._first_of_stack[paired[1]]
+            alike = self._are_alike(*paired)
         present = ~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores)
         missing, unlike = int(np.sum(~present)), int(np.sum(present & ~alike))
         pairs = Pairs(sides[0], sides[1], missing, unlike, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
         return pairs.select(present & alike)
+
+    def _are_alike(self, first: Integers, second: Integers) -> Flags:
+        """Returns whether the real times of the episodes in each pair are comparable, shape (pairs,).
+
+        Args:
+            first: Row of each pair's first episode.
+            second: Row of each pair's second episode.
+        """
+        workers = self._workers[first], self._workers[second]
+        unknown = (workers[0] == 0) | (workers[1] == 0)
+        same_workers = unknown | (workers[0] == workers[1])
+        return np.asarray(same_workers & (self._first_of_stack[first] == self._first_of_stack[second]))
 
     def _column(self, metric: Metric) -> Observations:
         """Returns the observations of a metric in every episode."""

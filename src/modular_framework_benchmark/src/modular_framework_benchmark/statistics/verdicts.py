@@ -20,6 +20,8 @@ from modular_framework_benchmark.statistics.power import min_units, pairs_for_ra
 PLANNED_RATE, PLANNED_WINS = 0.05, 0.2
 """Win differences for which sample sizes are planned: 5 points of a rate; 60 % won and 40 % lost pairs of a value."""
 
+UNLIKE = "only one episode is the first of its stack, or the numbers of workers differ"
+
 
 @dataclass(frozen=True, slots=True)
 class Correction:
@@ -112,7 +114,7 @@ def _reason(finding: Finding) -> str:
     if finding.counts.missing:
         return f"no pair has both values; {finding.counts.missing} pairs lack a value"
     if finding.counts.unlike:
-        return f"of each of {finding.counts.unlike} pairs, only one episode is the first of its stack"
+        return f"in each of {finding.counts.unlike} pairs, {UNLIKE}"
     return "no two episodes to compare"
 
 
@@ -174,9 +176,7 @@ def _exclusions(finding: Finding) -> tuple[str, ...]:
         f"{sentences.quantity_text(counts.missing, 'pair')} left out because an episode has no value"
         if counts.missing
         else "",
-        f"{sentences.quantity_text(counts.unlike, 'pair')} left out because only one episode is the first of its stack"
-        if counts.unlike
-        else "",
+        f"{sentences.quantity_text(counts.unlike, 'pair')} left out because {UNLIKE}" if counts.unlike else "",
         f"{sentences.quantity_text(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
         f"{counts.pairs} pairs of {sentences.quantity_text(counts.units, finding.unit_noun)}; "
         "all pairs of a unit count as one"
