@@ -270,6 +270,27 @@ def test_the_dry_run_of_a_mode_with_inverse_kinematics_shows_the_substituted_plu
     assert design_text(found, plan_episodes(found)).splitlines().count(f"  {line}") == 1
 
 
+def test_the_dry_run_shows_substitutions_of_the_planners_that_only_the_task_names_and_of_the_collision_detector(
+    tmp_path: Path,
+) -> None:
+    scripts = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
+    task = (scripts / "simulation_pick.yaml").read_text()
+    (tmp_path / "task.yaml").write_text(task.replace(FIRST_STATE, SET_PLANNER.format("ompl/PRM") + FIRST_STATE))
+    content = PLAIN | {
+        "task": str(tmp_path / "task.yaml"),
+        "parameters": {"/planner_name": "RRTstar", "/move_group/collision_detector": "Bullet"},
+    }
+    file = tmp_path / "experiment.yaml"
+    found = read_experiment(yaml.safe_dump(content), file, RosResourceLookup(), known_metrics(), checks())
+    lines = design_text(found, plan_episodes(found)).splitlines()
+    for text in (
+        "CBiRRT for RRTstar, which cannot keep path constraints",
+        "CBiRRT for PRM, which cannot keep path constraints",
+        "the framework's exact collision checker for Bullet",
+    ):
+        assert lines.count(f"  substitution: {text}") == 1, lines
+
+
 def test_mode_planning_takes_the_parameters_that_it_reads(tmp_path: Path) -> None:
     write_problem(tmp_path)
     given = {

@@ -150,6 +150,27 @@ def test_a_record_says_by_which_method_poses_were_solved_and_for_which_plugin(tm
     )
 
 
+@pytest.mark.parametrize(
+    ("parameters", "text"),
+    [
+        ({"move_group": {"collision_detector": "Bullet"}}, "the framework's exact collision checker for Bullet"),
+        ({"collision_detector": "hybrid"}, "the framework's exact collision checker for hybrid"),
+        ({"collision_detector": "FCL"}, ""),
+        ({"move_group": {"collision_detector": "my_arm.checks/MyChecker"}}, ""),
+        ({}, ""),
+    ],
+)
+def test_a_record_says_which_collision_checker_ran_and_for_which_detector(
+    tmp_path: Path, parameters: dict[str, Any], text: str
+) -> None:
+    plans = [plan("RRT", "OMPL"), plan("RRT", "OMPL")]
+    plans[1]["run"]["collision_checker"] = "checks/MyChecker"
+    ran = running_stack(parameters, {}, [], plans)
+    snapshot = record_of(tmp_path, json.loads(json.dumps(asdict(ran)))).snapshot
+    assert snapshot["collision_checker"] == "checks/MyChecker"
+    assert snapshot["substitutions"] == ((text,) if text else ())
+
+
 def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("PRM", "CBiRRT"), plan("PRM", "OMPL")))
     assert record.status is EpisodeStatus.SUCCEEDED

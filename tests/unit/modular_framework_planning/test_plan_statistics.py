@@ -169,6 +169,7 @@ def test_a_plan_says_which_planner_searched_and_what_it_replaced(
     run = pipeline.plan(request).statistics.as_json()["run"]
     assert (run["pipeline"], run["planner"], run["implementation"]) == ("ompl", planner, implementation)
     assert run["replaced"] == replaced
+    assert run["collision_checker"].endswith(".exact_collision_checker/ExactCollisionChecker")
 
 
 def test_a_plan_says_its_settings_and_one_without_a_search_that_none_ran(small: RobotModel) -> None:

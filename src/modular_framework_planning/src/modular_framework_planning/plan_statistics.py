@@ -68,6 +68,7 @@ class PlannerRun:
         implementation: Implementation of the search (`compiled`, `OMPL` or `CBiRRT`); empty without a search.
         replaced: Requested planner_id that the pipeline does not have; otherwise empty.
         solver: Inverse kinematics solver of pose goals; empty without a pose goal.
+        collision_checker: Class of the collision checker as `module/Class`.
     """
 
     pipeline: str
@@ -77,6 +78,7 @@ class PlannerRun:
     implementation: str = ""
     replaced: str = ""
     solver: str = ""
+    collision_checker: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from modular_framework_benchmark.records.episode_settings import model_file
 from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
+    detector_substitutions,
     named_solvers,
     solver_substitutions,
 )
@@ -39,6 +40,7 @@ FILE_PARAMETERS = {
 """Parameters of nodes that name files, keyed by kind of file."""
 NODE_TIMEOUT_S = 5.0
 KINEMATICS_PARAMETER = "/robot_description_kinematics"
+DETECTORS = ("/move_group/collision_detector", "/collision_detector")
 WORLD, MODEL_PATH = "/gazebo/world_file", "/gazebo_model_path"
 DESCRIPTION_PARAMETERS = ("/robot_description", "/robot_description_semantic")
 
@@ -67,7 +69,10 @@ def running_stack(
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
         digests=_digests(parameters, controllers, models) | _command_digests(parameters, generators),
-        substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS_PARAMETER))),
+        substitutions=(
+            *solver_substitutions(named_solvers(_value(parameters, KINEMATICS_PARAMETER))),
+            *detector_substitutions(next(filter(None, (str(_value(parameters, name)) for name in DETECTORS)), "")),
+        ),
     )
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]

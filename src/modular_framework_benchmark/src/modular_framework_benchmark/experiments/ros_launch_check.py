@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -26,6 +27,7 @@ from modular_framework_benchmark.experiments.ros_pipeline_names import (
     MANAGER,
     PipelineNames,
     move_group_faults,
+    named_detector,
     resolved_names,
     unknown_name,
 )
@@ -230,6 +232,10 @@ class LaunchCheck:
         unnamed = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
         return unnamed | resolved_names(self.launch, self._node)
 
+    def collision_detector(self) -> str:
+        """Returns the named collision detector; "" for the default, and without a move_group node."""
+        return "" if self._node is None else named_detector(self.launch, self._node)
+
     def without_effect(self) -> dict[str, str]:
         """Returns the parameters that change nothing in an episode, and the reason as the end of a sentence."""
         return self._unused_names.reasons()
@@ -258,6 +264,20 @@ class LaunchCheck:
             return registry.resolve(str(self.launch.parameters.get("/planner_name", "")), group) if registry else None
         except (UnknownNameError, ModelError):
             return None
+
+    def planners(self) -> tuple[ResolvedPlanner, ...]:
+        """Returns the existing planners that the launch and its task name; the planner of the task is the first."""
+        registry, group = self.registry(), str(self.launch.parameters.get("/arm_group_name", ""))
+        if registry is None:
+            return ()
+        named = [value for _, value in self._names.naming("planner")]
+        if self._task is not None:
+            named += self._task.planners
+        planners = [self.planner()]
+        for name in dict.fromkeys(named):
+            with contextlib.suppress(UnknownNameError, ModelError):
+                planners.append(registry.resolve(name, group))
+        return tuple(planner for planner in planners if planner is not None)
 
     def _task_faults(self) -> Iterator[LaunchFault]:
         """Yields the faults of the task, its states and templates, or of the state machine to load."""

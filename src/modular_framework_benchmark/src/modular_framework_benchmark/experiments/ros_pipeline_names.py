@@ -16,7 +16,7 @@ from modular_framework_planning.move_group.plugin_names import (
     OPTIONAL_CAPABILITIES,
     SIMPLE_MANAGER,
 )
-from modular_framework_planning.planning_interface.collision_detectors import collision_detector
+from modular_framework_planning.planning_interface.collision_detectors import checker_name, collision_detector
 from modular_framework_planning.planning_pipeline.planner_registry import PlannerRegistry, UnknownNameError
 from modular_framework_ros.allowed_names import listing, misspelling, nearest
 from modular_framework_ros.declared_trees import tree_fault
@@ -149,6 +149,17 @@ def _capability_faults(name: str, value: Any) -> Iterator[LaunchFault]:
             yield LaunchFault(name, f"parameter '{name}': there is no capability '{capability}'; {hint}")
 
 
+def named_detector(launch: LaunchPreview, node: LaunchedNode) -> str:
+    """Returns the collision detector that a launch names; "" for the default.
+
+    Args:
+        launch: Launch.
+        node: Node move_group of the launch.
+    """
+    names = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
+    return str(next((launch.parameters[name] for name in names if name in launch.parameters), ""))
+
+
 def resolved_names(launch: LaunchPreview, node: LaunchedNode) -> dict[str, str]:
     """Returns the implementation of each name.
 
@@ -156,8 +167,6 @@ def resolved_names(launch: LaunchPreview, node: LaunchedNode) -> dict[str, str]:
         launch: Launch without faults.
         node: Node move_group of the launch.
     """
-    names = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
-    detector = next((launch.parameters[name] for name in names if name in launch.parameters), "")
-    kind: Any = collision_detector(str(detector))
+    checker = checker_name(collision_detector(named_detector(launch, node)))
     manager = str(launch.parameters.get(f"{node.name}/{MANAGER}") or SIMPLE_MANAGER)
-    return {DETECTOR: f"{kind.__module__}/{kind.__qualname__}", MANAGER: manager.replace("::", "/")}
+    return {DETECTOR: checker, MANAGER: manager.replace("::", "/")}

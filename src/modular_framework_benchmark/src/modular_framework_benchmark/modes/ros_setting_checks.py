@@ -45,7 +45,12 @@ from modular_framework_benchmark.modes.ros_planning_runner import (
 )
 from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_benchmark.records.episode_settings import SettingsError, as_json
-from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
+from modular_framework_benchmark.records.used_software import (
+    detector_substitutions,
+    named_solvers,
+    solver_substitutions,
+    substitution_text,
+)
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
@@ -190,8 +195,9 @@ def check_task(runner: object, read: ReadSettings[TaskSettings]) -> CheckedSetti
             },
         },
         (
-            *_substitutions(check.registry(), check.planner()),
+            *_substitutions(check.registry(), check.planners()),
             *solver_substitutions(named_solvers(check.kinematics())),
+            *detector_substitutions(check.collision_detector()),
         ),
         {**check.without_effect(), "/extra_parameters": "sets no value"},
     )
@@ -204,10 +210,16 @@ def _content_of(value: Any) -> Any:
     return value
 
 
-def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
-    """Returns the text of the substitution that constrained requests cause, as in the records of plans."""
-    constrained = registry.constrained_planner(planner) if registry is not None and planner is not None else ""
-    return (substitution_text(planner.planner, constrained),) if planner is not None and constrained else ()
+def _substitutions(registry: PlannerRegistry | None, planners: Iterable[ResolvedPlanner]) -> tuple[str, ...]:
+    """Returns the texts of the substitutions that constrained requests cause, as in the records of plans."""
+    if registry is None:
+        return ()
+    texts = (
+        substitution_text(planner.planner, constrained)
+        for planner in planners
+        if (constrained := registry.constrained_planner(planner))
+    )
+    return tuple(dict.fromkeys(texts))
 
 
 def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSettings]) -> CheckedSettings:
@@ -232,7 +244,7 @@ def check_planning(runner: PlanningEpisodeRunner, read: ReadSettings[PlanningSet
     return CheckedSettings(
         (),
         _resolved_planning(robot, settings, planner),
-        _substitutions(check.registry(), planner),
+        _substitutions(check.registry(), [planner]),
         _unused_configurations(settings, planner),
     )
 

@@ -49,18 +49,20 @@ class UsedSoftware:
     Attributes:
         planners: Planners, keyed by "PLANNER of PIPELINE".
         solver: Inverse kinematics methods; empty if no pose was solved.
+        collision_checker: Classes of the collision checkers as `module/Class`; empty without a plan.
         methods: Grasp generation methods, keyed by package.
         controllers: Types of the running controllers, keyed by name.
         physics_engine: Physics engine of the simulation.
         renderer: Renderer of the cameras; empty without cameras.
         digests: SHA-256 of the robot's descriptions and meshes, of the world and the objects with the files that they
             name, of the task, and of the controllers' parameters, keyed by description.
-        substitutions: Documented substitutions of named software: CBiRRT for constrained plans.
+        substitutions: Documented substitutions of named software, such as CBiRRT for constrained plans.
         replaced: Named software that was missing, with its replacement, which makes the episode invalid.
     """
 
     planners: Mapping[str, UsedPlanner] = field(default_factory=dict)
     solver: str = ""
+    collision_checker: str = ""
     methods: Mapping[str, UsedMethod] = field(default_factory=dict)
     controllers: Mapping[str, str] = field(default_factory=dict)
     physics_engine: str = ""
@@ -87,6 +89,7 @@ class UsedSoftware:
         runs, planners = list(runs), dict[str, UsedPlanner]()
         substitutions, replaced = set(self.substitutions), set(self.replaced)
         solvers = {self.solver, *(run.solver for run in runs)} - {""}
+        checkers = {self.collision_checker, *(run.collision_checker for run in runs)} - {""}
         for run in runs:
             name = f"{run.planner} of {run.pipeline}"
             before = planners[name].implementations if name in planners else ()
@@ -100,6 +103,7 @@ class UsedSoftware:
             self,
             planners=planners,
             solver=", ".join(sorted(solvers)),
+            collision_checker=", ".join(sorted(checkers)),
             substitutions=tuple(sorted(substitutions)),
             replaced=tuple(sorted(replaced)),
         )
@@ -107,6 +111,8 @@ class UsedSoftware:
 
 IMPLEMENTATION = "implementation"
 """Snapshot key of a planner's implementations."""
+DEFAULT_DETECTOR = "fcl"
+"""Name of the framework's checker in the parameter `collision_detector`; MoveIt's other names also select it."""
 CONSTRAINED = "CBiRRT"
 """Planner of requests whose path constraints other planners cannot satisfy."""
 
@@ -126,3 +132,14 @@ def solver_substitutions(named: Iterable[str]) -> tuple[str, ...]:
     """Returns the substitutions of the solvers that kinematics.yaml names, as records and dry runs show them."""
     plugins = sorted(set(named) - {"", NUMERIC, CLOSED_FORM})
     return tuple(f"the framework's inverse kinematics for {plugin}" for plugin in plugins)
+
+
+def detector_substitutions(named: str) -> tuple[str, ...]:
+    """Returns the substitution of a named collision detector, as records and dry runs show it.
+
+    Args:
+        named: MoveIt's name, or `module/Class`, which runs itself; "" for the default.
+    """
+    if "/" in named or named.lower() in ("", DEFAULT_DETECTOR):
+        return ()
+    return (f"the framework's exact collision checker for {named}",)

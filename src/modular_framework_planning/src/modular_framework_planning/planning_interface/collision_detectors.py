@@ -6,6 +6,8 @@ Only this module chooses a checker; classes that need a checker receive a factor
 
 from __future__ import annotations
 
+from typing import Any
+
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.planning_interface.collision_checker import CollisionCheckerFactory
@@ -48,3 +50,9 @@ def collision_detector(name: str = DEFAULT_COLLISION_DETECTOR) -> CollisionCheck
     if missing:
         raise ModelError(f"collision_detector '{name}' has no method {', '.join(missing)}; {allowed}")
     return kind
+
+
+def checker_name(new_checker: CollisionCheckerFactory) -> str:
+    """Returns the class of a collision checker as `module/Class`."""
+    kind: Any = new_checker
+    return f"{kind.__module__}/{kind.__qualname__}"

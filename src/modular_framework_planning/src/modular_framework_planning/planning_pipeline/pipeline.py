@@ -18,7 +18,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
-from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER, checker_name
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError
 from modular_framework_planning.planning_interface.phase_times import SETUP, PhaseTimes
@@ -260,7 +260,13 @@ class PlanningPipeline:
         planner_id, parameters, replaced = self._chosen_planner(request.planner_id, group.name)
         adapters = tuple(type(item).__name__ for item in self._adapters_for(request))
         phases.run = PlannerRun(
-            self.name, planner_id, parameters, adapters, replaced=replaced, solver=self._solver(request)
+            self.name,
+            planner_id,
+            parameters,
+            adapters,
+            replaced=replaced,
+            solver=self._solver(request),
+            collision_checker=checker_name(self._new_checker),
         )
         start = np.array(request.scene.positions)
         if not np.isfinite(start).all():
