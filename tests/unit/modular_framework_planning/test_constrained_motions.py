@@ -29,8 +29,7 @@ from modular_framework_planning.planning_interface.planning_request import Joint
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
-from modular_framework_planning.trajectory_processing.path_shortening import path_length
+from modular_framework_planning.trajectory_processing.path_shortening import path_length, shortcut_pieces
 
 GROUP = "arm_and_manipulator"
 START = (1.57, -1.57, 1.2, -1.2, -1.57, 0.0)
@@ -139,19 +138,18 @@ def test_a_path_is_cut_along_the_constraint_and_keeps_its_ends() -> None:
     def on_circle(angle: float) -> np.ndarray:
         return np.array([np.cos(angle), np.sin(angle)])
 
-    def way(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    def way(first: np.ndarray, second: np.ndarray, max_length: float) -> np.ndarray | None:
         begin, end = (np.arctan2(*point[::-1]) for point in (first, second))
-        return np.vstack([first, [on_circle(angle) for angle in np.linspace(begin, end, 20)], second])
+        piece = np.vstack([first, [on_circle(angle) for angle in np.linspace(begin, end, 20)], second])
+        return piece if path_length(piece) <= max_length else None
 
     detour = np.vstack([[on_circle(angle) for angle in np.linspace(a, b, 20)] for a, b in ((0.0, 2.0), (2.0, 1.0))])
-    short = cut_along(detour, way, lambda _: True, np.inf, np.random.default_rng(1))
+    short = shortcut_pieces(detour, way, np.inf, np.random.default_rng(1))
     assert np.array_equal(short[0], detour[0]) and np.array_equal(short[-1], detour[-1])
     assert path_length(detour) > 2.9 and path_length(short) < 1.2
     assert np.abs(np.linalg.norm(short, axis=1) - 1.0).max() < 0.01
-    assert np.array_equal(cut_along(detour, way, lambda _: False, np.inf, np.random.default_rng(1)), detour)
-    assert np.array_equal(
-        cut_along(detour, way, lambda _: True, time.monotonic() - 1.0, np.random.default_rng(1)), detour
-    )
+    assert np.array_equal(shortcut_pieces(detour, lambda *_: None, np.inf, np.random.default_rng(1)), detour)
+    assert np.array_equal(shortcut_pieces(detour, way, time.monotonic() - 1.0, np.random.default_rng(1)), detour)
 
 
 def distance_outside(solid: BoxSolid | SphereSolid, point: np.ndarray) -> float:

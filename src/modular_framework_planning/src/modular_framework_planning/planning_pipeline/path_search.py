@@ -15,7 +15,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.problem_shortening import shorten_path
-from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
+from modular_framework_planning.trajectory_processing.path_shortening import path_length, shortcut_pieces
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
@@ -105,11 +105,13 @@ def _without_vertices(problem: PlanningProblem, path: Array, deadline: float) ->
 
 
 def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    step = problem.settings.finest_step
+    step, connect = problem.settings.finest_step, problem.constrained_motion(problem.step).connect
 
-    def is_valid(polyline: Array) -> bool:
-        return problem.satisfies_constraints(polyline, step) and all(
-            problem.motion.edge_is_free(first, second, step) for first, second in pairwise(polyline)
-        )
+    def join(start: Array, end: Array, max_length: float) -> Array | None:
+        piece = connect(start, end)
+        if piece is None or path_length(piece) > max_length or not problem.satisfies_constraints(piece, step):
+            return None
+        is_free = all(problem.motion.edge_is_free(first, second, step) for first, second in pairwise(piece))
+        return piece if is_free else None
 
-    return cut_along(path, problem.constrained_motion(problem.step).connect, is_valid, deadline, problem.rng)
+    return shortcut_pieces(path, join, deadline, problem.rng)
