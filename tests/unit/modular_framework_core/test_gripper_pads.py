@@ -68,6 +68,7 @@ def true_openings(urdf: str, gripper: GripperGeometry) -> np.ndarray:
     distances = []
     for position in gripper.positions:
         values = np.full(model.nq, position)  # jaws without a mimic tag move together
+        values = np.where(model.upperPositionLimit <= 0.0, -position, values)
         pinocchio.updateGeometryPlacements(model, data, shapes, placed, values)
         ends = []
         for number in numbers:
@@ -83,9 +84,16 @@ def true_openings(urdf: str, gripper: GripperGeometry) -> np.ndarray:
         (four_bar_hand(), 0.0859),
         (jaws(mimic("drive", 1.0)), 0.1),
         (jaws(limit(0.05)), 0.1),
+        (jaws('<limit lower="-0.05" upper="0" effort="10" velocity="2"/>', "0 1 0"), 0.1),
         (turning_hand(), None),
     ],
-    ids=["four-bar fingers", "jaws with a mimic tag", "jaws without one", "turning fingers"],
+    ids=[
+        "four-bar fingers",
+        "jaws with a mimic tag",
+        "jaws without one",
+        "jaws with opposite limits",
+        "turning fingers",
+    ],
 )
 def test_the_opening_is_the_distance_of_the_pads_over_the_whole_stroke(urdf: str, opening: float | None) -> None:
     gripper = measure_gripper(urdf, "palm", "drive")

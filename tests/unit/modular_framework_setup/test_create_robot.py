@@ -273,6 +273,15 @@ def test_a_gripper_gets_a_grasp_frame_and_its_second_finger_follows_the_first(pa
     assert pair.get("reason") == "Default"
 
 
+def test_fingers_with_equal_axes_and_opposite_limits_are_a_gripper(package_path: Path) -> None:
+    second = joint("slide_b", "palm", "finger_b", "0 0 0.041", "0 -1 0", "prismatic")
+    opposite = second.replace("0 -1 0", "0 1 0").replace('lower="0" upper="0.04"', 'lower="-0.04" upper="0"')
+    made = make("crane_1", package_path, write(package_path, CRANE.replace(second, opposite)), "--samples", "100")
+    mimic = ElementTree.fromstring(made.text()).find("joint[@name='slide_b']/mimic")
+    assert mimic is not None and mimic.attrib == {"joint": "slide_a", "multiplier": "-1"}
+    assert made.states()["gripper open"] == {"slide_a": 0.04}
+
+
 def test_the_grasp_frame_of_fingers_on_two_links_each_is_straight_and_in_the_middle(package_path: Path) -> None:
     made = make("crane_1", package_path, write(package_path, four_bar_crane()), "--samples", "100")
     origin = ElementTree.fromstring(made.text()).find("joint[@name='gripper_grasp_frame_joint']/origin")

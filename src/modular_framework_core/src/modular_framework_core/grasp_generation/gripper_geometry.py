@@ -24,6 +24,7 @@ from modular_framework_core.grasp_generation.convex_bodies import (
 )
 from modular_framework_core.grasp_generation.hand_axes import hand_axes
 from modular_framework_urdf.mimics import resolve_mimics
+from modular_framework_urdf.mirrored_joints import mirror_multiplier
 from modular_framework_urdf.planning_groups import KinematicTree
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -264,13 +265,11 @@ def _face_each_other(corners: Array, others: Array) -> bool:
 
 def _hand_parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
     """Places the collision shapes of the hand in the grasp frame, at every joint position."""
-    driven = model.driven_joints(joint)
+    factors = model.driven_joints(joint)
+    states = [{name: factor * position for name, factor in factors.items()} for position in positions.tolist()]
     for link in model.hand_links(joint):
         transforms = np.array(
-            [
-                np.linalg.inv(model.pose(grasp_link, state)) @ model.pose(link, state)
-                for state in (dict.fromkeys(driven, position) for position in positions.tolist())
-            ]
+            [np.linalg.inv(model.pose(grasp_link, state)) @ model.pose(link, state) for state in states]
         )
         for body in model.bodies_of(link):
             corners = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.corners) + transforms[:, None, :3, 3]
@@ -297,21 +296,17 @@ class _Model:
         except ValueError as error:
             raise GripperGeometryError(str(error)) from error
 
-    def driven_joints(self, joint: str) -> set[str]:
-        """Returns a joint and its mirrored joints; jaws with a common motor often have no mimic tag (Fetch)."""
-        return {joint} | {name for name in self.joints if self._is_mirrored(self.joints[joint], self.joints[name])}
+    def driven_joints(self, joint: str) -> dict[str, float]:
+        """Returns a joint and its mirrored joints, each with the factor of its position.
 
-    def _is_mirrored(self, joint: Joint, other: Joint) -> bool:
-        axes = [self._origins[each.name][:3, :3] @ _unit_axis(each) for each in (joint, other)]
-        return (
-            (joint.parent, joint.kind, joint.limit) == (other.parent, other.kind, other.limit)
-            and joint.mimic is other.mimic is None
-            and bool(np.allclose(axes[0], -axes[1], atol=1e-6))
-        )
+        Jaws with a common motor often have no mimic tag (Fetch, WSG 50).
+        """
+        factors = {name: mirror_multiplier(self.joints[joint], other) for name, other in self.joints.items()}
+        return {joint: 1.0} | {name: factor for name, factor in factors.items() if factor}
 
     def moving_links(self, joint: str) -> list[str]:
         """Returns the links moved by a joint, by its mirrored joints, or by mimic joints of these joints."""
-        driven = self.driven_joints(joint)
+        driven = set(self.driven_joints(joint))
         driven |= {name for name, mimic in self._mimics.items() if mimic.leader in driven}
         return [link for link in self.links if any(name in driven for name, _ in self._tree.up(link))]
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.errors import CreationError
+from modular_framework_urdf.mirrored_joints import mirror_multiplier
 from modular_framework_urdf.robot import Joint
 
 MIN_ARM_JOINTS = 2
@@ -28,6 +29,7 @@ class Gripper:
         joints: All joints, the driver first.
         links: Links of the fingers.
         twin: Second finger joint that must mimic the driver but has no <mimic> in the URDF; "" for none.
+        twin_multiplier: Multiplier of the <mimic> of the twin.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Gripper:
     joints: tuple[str, ...]
     links: tuple[str, ...]
     twin: str = ""
+    twin_multiplier: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +145,7 @@ def _mimic_sets(tree: RobotTree) -> list[list[Joint]]:
 
 
 def _twins(tree: RobotTree) -> list[list[Joint]]:
-    """Returns pairs of equal, last driven joints on the same link, which are fingers without a mimic joint."""
+    """Returns pairs of mirrored, last driven joints on the same link, which are fingers without a mimic joint."""
     twins = []
     leaders = {joint.mimic.leader for joint in tree.robot.joints if joint.mimic}
     for link in tree.links:
@@ -153,7 +156,7 @@ def _twins(tree: RobotTree) -> list[list[Joint]]:
             and joint.name not in leaders
             and not any(map(is_driven, joints_below(tree, joint.child)))
         ]
-        if len(ends) == 2 and ends[0].kind == ends[1].kind != "continuous" and ends[0].limit == ends[1].limit:
+        if len(ends) == 2 and ends[0].kind != "continuous" and mirror_multiplier(*ends):
             twins.append(ends)
     return twins
 
@@ -167,13 +170,14 @@ def _gripper(tree: RobotTree, joints: Sequence[Joint]) -> Gripper:
     links += [joint.child for link in links for joint in joints_below(tree, link) if joint.name not in names]
     ordered = [drivers[0].name, *(joint.name for joint in joints if joint is not drivers[0])]
     twin = drivers[1].name if len(drivers) == 2 == len(joints) else ""
+    multiplier = mirror_multiplier(*drivers) or 1.0 if twin else 1.0
     if len(drivers) > 1 and not twin:
         raise CreationError(
             f"the gripper on link '{palm}' has {len(drivers)} driven joints "
             f"({', '.join(item.name for item in drivers)}); only one may be driven, the others must mimic it; add "
             "<mimic> to the URDF, or name the fingers by --gripper"
         )
-    return Gripper("gripper", palm, drivers[0].name, tuple(ordered), tuple(dict.fromkeys(links)), twin)
+    return Gripper("gripper", palm, drivers[0].name, tuple(ordered), tuple(dict.fromkeys(links)), twin, multiplier)
 
 
 def _ancestors(tree: RobotTree, link: str) -> Iterable[str]:
@@ -204,10 +208,7 @@ def _side(prefix: str, prefixes: Sequence[str]) -> str:
 
 def _named_grippers(grippers: Sequence[Gripper]) -> tuple[Gripper, ...]:
     names = _distinct([_common_prefix(item.joints) for item in grippers], "gripper")
-    return tuple(
-        Gripper(name, item.palm, item.driver, item.joints, item.links, item.twin)
-        for name, item in zip(names, grippers, strict=True)
-    )
+    return tuple(replace(item, name=name) for name, item in zip(names, grippers, strict=True))
 
 
 def _given_arms(tree: RobotTree, chains: Sequence[tuple[str, str]], grippers: Sequence[Gripper]) -> tuple[Arm, ...]:

@@ -33,8 +33,9 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
     notes = []
     for gripper in grippers:
         if gripper.twin:
-            add_child(_joint(root, gripper.twin), "mimic", joint=gripper.driver)
-            notes.append(f"joint '{gripper.twin}' mimics '{gripper.driver}' now")
+            multiplier = f"{gripper.twin_multiplier:g}"
+            add_child(_joint(root, gripper.twin), "mimic", joint=gripper.driver, multiplier=multiplier)
+            notes.append(f"joint '{gripper.twin}' mimics '{gripper.driver}' with the multiplier {multiplier} now")
     notes += [note for joint in tree.robot.movable_joints() if (note := _add_limits(_joint(root, joint.name)))]
     for link in tree.robot.links:
         element = next(item for item in root.findall("link") if item.get("name") == link.name)
