@@ -40,6 +40,19 @@ def jaws() -> str:
     return PARALLEL_JAWS.format(housing='cylinder radius="0.05" length="0.06"')
 
 
+def fixed_jaw() -> str:
+    """The jaws, of which only the left one moves."""
+    moving = '<limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="slide"/>'
+    return jaws().replace('name="slide_2" type="prismatic"', 'name="slide_2" type="fixed"').replace(moving, "")
+
+
+def unequal_jaws() -> str:
+    """The jaws, of which the right one moves a quarter as far as the left one."""
+    return (
+        jaws().replace('<mimic joint="slide"/>', '<mimic joint="slide" multiplier="0.25"/>').replace("slide", "drive")
+    )
+
+
 def _straight(angle: float) -> float:
     return math.pi / 2 - angle
 
@@ -51,6 +64,7 @@ FOLLOWERS: dict[str, dict[str, Callable[[float], float]]] = {
         "ezgripper_knuckle_L1_L2_2": _straight,
     },
     "slide": {"slide_2": float},
+    "drive": {"drive_2": lambda position: 0.25 * position},
 }
 GRIPPERS = [(ezgripper, "ezgripper_knuckle_palm_L1_1", "eg_manipulator"), (jaws, "slide", "tool")]
 HAND_LINKS = ("finger", "palm", "left", "right", "housing")
@@ -71,7 +85,8 @@ class Hand:
         values = pinocchio.neutral(self._model)
         self._set(values, self._joint, joint)
         for follower, rule in FOLLOWERS.get(self._joint, {}).items():
-            self._set(values, follower, rule(joint))
+            if self._model.existJointName(follower):
+                self._set(values, follower, rule(joint))
         pinocchio.framesForwardKinematics(self._model, self._data, values)
         to_world = pinocchio.SE3(rotation, np.array(position)) * self._data.oMf[self._frame].inverse()
         return {

@@ -21,12 +21,12 @@ from modular_framework_core.grasp_generation import solid_meshes, surface_points
 from modular_framework_core.grasp_generation.grasp_candidates import GraspQuery, NoCandidatesError
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry, measure_gripper
 from modular_framework_core.grasp_generation.hand_poses import HandSettings
-from modular_framework_core.grasp_generation.pair_grasps import PairGrasp
+from modular_framework_core.grasp_generation.pair_grasps import PairGrasp, candidates_of
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from two_finger_hands import GRIPPERS, Hand, ezgripper  # noqa: E402
+from two_finger_hands import GRIPPERS, Hand, ezgripper, fixed_jaw, jaws, unequal_jaws  # noqa: E402
 
 SETTINGS = AntipodalSettings(max_poses=60, max_candidates=12)
 TABLE_M, PLACE = 0.84, (0.1, 0.5)
@@ -137,6 +137,48 @@ def test_the_hand_advances_and_closes_without_touching_anything_but_with_its_pad
             seen += [min(distances(hand, gripper, grasp, 0.0, float(closing), body).values()) for body in bodies]
         assert min(seen) > 0.0, (name, grasp)
         assert grasp.clearance <= min(seen) + 1e-4, "what is reported is no more than what FCL measures"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "joint"), [(fixed_jaw, "slide"), (unequal_jaws, "drive")], ids=["fixed jaw", "unequal strokes"]
+)
+def test_jaws_of_unequal_strokes_advance_around_the_object_and_push_it_to_the_slower_jaw(
+    urdf: Callable[[], str], joint: str
+) -> None:
+    gripper, hand = measure_gripper(urdf(), "tool", joint), Hand(urdf(), joint, "tool")
+    target = placed("bar", surface_points.box((0.02, 0.06, 0.12)), [solid_meshes.box((0.02, 0.06, 0.12))])
+    grasps = antipodal_grasps(query(target, gripper, TABLE), SETTINGS)
+    assert grasps
+    sides = {float(np.sign(grasp.pose.axes[:, 0] @ grasps[0].pose.axes[:, 0])) for grasp in grasps}
+    assert sides == {-1.0, 1.0}, "the slower jaw may be on either side"
+    for grasp in grasps[:6]:
+        pregrasp, resting = gripper.position_for(grasp.pose.opening), tree(target)
+        for back in np.linspace(0.0, SETTINGS.hand.approach_distance_m, 4):
+            room = distances(hand, gripper, grasp, float(back), pregrasp, resting)
+            assert min(room.values()) > SETTINGS.hand.min_finger_clearance_m - SAMPLING_M, (grasp, back, room)
+        assert room["left_0"] == pytest.approx(room["right_0"], abs=1e-3) and room["left_0"] > 0.0
+        closed = grasp.pose.width + TOUCH_M
+        push = gripper.pad_centre_at(closed) - gripper.pad_centre_at(grasp.pose.opening)
+        held = tree(target)
+        held.setTranslation(grasp.pose.axes[:, 0] * push[0])
+        room = distances(hand, gripper, grasp, 0.0, gripper.position_for(closed), held)
+        assert all(0.0 < room[pad] < TOUCH_M for pad in ("left_0", "right_0")), room
+        assert min(room.values()) > 0.0, room
+
+
+def test_a_turned_hand_closes_at_the_same_place_if_its_frame_is_beside_the_pads() -> None:
+    beside = jaws().replace('<origin xyz="0 0 0.115"/>', '<origin xyz="0.01 0.006 0.115"/>')
+    gripper, settings = measure_gripper(beside, "tool", "slide"), SETTINGS
+    grasps = antipodal_grasps(query(OBJECTS["box"], gripper, TABLE), settings)
+    candidates = candidates_of(grasps, gripper, settings)
+    assert len(candidates) == 2 * len(grasps) > 0
+    for grasp, candidate in zip(2 * grasps, candidates, strict=True):
+        pads = candidate.position + candidate.hand_axes @ gripper.pad_centre_at(grasp.pose.width)
+        beside_contacts = candidate.hand_axes.T @ (pads - grasp.pose.contacts.mean(axis=0))
+        assert beside_contacts[0] == pytest.approx(0.0, abs=TOUCH_M), "along the closing direction"
+    for one, turned in zip(candidates[: len(grasps)], candidates[len(grasps) :], strict=True):
+        first, second = (each.position + each.hand_axes @ gripper.pad_centre_at(0.05) for each in (one, turned))
+        assert first == pytest.approx(second, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", OBJECTS)

@@ -18,7 +18,7 @@ from modular_framework_core.grasp_generation.hand_motion_settings import HandMot
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from two_finger_hands import jaws  # noqa: E402
+from two_finger_hands import fixed_jaw, jaws  # noqa: E402
 
 PAD_CENTRE_TO_TOOL_M = 0.115 - 0.095
 """Distance of the tool frame in front of the centre of the pads, from the hand's file."""
@@ -63,3 +63,12 @@ def test_a_grasp_without_clearance_for_the_fingers_is_omitted(gripper: GripperGe
     widths = np.array([0.0939, 0.0941])
     grasps = Grasps("world", np.tile(np.eye(4), (2, 1, 1)), np.array([0.2, 0.9]), widths)
     assert [found.quality for found in grasp_candidates(grasps, gripper, HandMotionSettings())] == [0.2]
+
+
+def test_an_object_is_in_the_middle_of_a_jaw_that_moves_and_one_that_is_fixed() -> None:
+    gripper = measure_gripper(fixed_jaw(), "tool", "slide")
+    grasps = Grasps("world", np.eye(4)[None], np.array([0.2]), np.array([0.02]))
+    (found,) = grasp_candidates(grasps, gripper, HandMotionSettings())
+    opening = 0.02 + 2 * 0.012
+    assert found.pregrasp_joint == pytest.approx(opening, abs=1e-6)
+    assert found.position == pytest.approx([-opening / 2, 0.0, PAD_CENTRE_TO_TOOL_M])

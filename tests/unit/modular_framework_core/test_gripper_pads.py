@@ -39,6 +39,15 @@ def jaws(second: str, axis: str = "0 -1 0") -> str:
 {joint("other", "prismatic", "palm", "right_pad", "0 -0.006 0", axis, second)}</robot>"""
 
 
+def fixed_jaw(pivot: str = "") -> str:
+    """A hand of a jaw on the palm, and of a jaw that slides, or turns about an axis in the palm."""
+    kind, axis, motion = ("revolute", pivot, limit(0.4)) if pivot else ("prismatic", "0 1 0", limit(0.05))
+    return f"""<robot name="vise">{link("palm", 0.06, 0.14, 0.04)}
+{link("left_pad", 0.02, 0.012, 0.05, z=0.05)}{link("right_pad", 0.03, 0.02, 0.09, z=0.065)}
+{joint("drive", kind, "palm", "left_pad", "0 0.006 0", axis, motion)}
+{joint("mount", "fixed", "palm", "right_pad", "0 -0.01 0")}</robot>"""
+
+
 def turning_hand() -> str:
     """A hand of two turning fingers with tips that stay upright, one of which carries a frame without a shape (PR2)."""
     parts = [link("palm", 0.06, 0.1, 0.05)]
@@ -86,6 +95,9 @@ def true_openings(urdf: str, gripper: GripperGeometry) -> np.ndarray:
         (jaws(limit(0.05)), 0.1),
         (jaws('<limit lower="-0.05" upper="0" effort="10" velocity="2"/>', "0 1 0"), 0.1),
         (turning_hand(), None),
+        (jaws(mimic("drive", 0.3)), 0.065),
+        (fixed_jaw(), 0.05),
+        (fixed_jaw("-1 0 0"), None),
     ],
     ids=[
         "four-bar fingers",
@@ -93,6 +105,9 @@ def true_openings(urdf: str, gripper: GripperGeometry) -> np.ndarray:
         "jaws without one",
         "jaws with opposite limits",
         "turning fingers",
+        "unequal strokes",
+        "a fixed jaw",
+        "a jaw that turns towards a fixed one",
     ],
 )
 def test_the_opening_is_the_distance_of_the_pads_over_the_whole_stroke(urdf: str, opening: float | None) -> None:
@@ -126,7 +141,7 @@ def test_mimic_joints_in_a_circle_are_refused() -> None:
 
 def test_the_fingertips_of_a_four_bar_hand_are_in_front_of_the_pads() -> None:
     gripper = measure_gripper(four_bar_hand(), "palm", "drive")
-    assert (gripper.tips >= gripper.pad_centres + gripper.pad_half_height - TOLERANCE_M).all()
+    assert (gripper.tips >= gripper.pad_centres[:, 2] + gripper.pad_half_height - TOLERANCE_M).all()
     assert gripper.pad_half_width == pytest.approx(0.011) and gripper.pad_half_height == pytest.approx(
         0.01875, abs=1e-3
     )
@@ -136,8 +151,35 @@ def test_the_fingertips_of_a_four_bar_hand_are_in_front_of_the_pads() -> None:
     ("second", "axis"), [(limit(0.04), "0 -1 0"), (limit(0.05), "0 1 0")], ids=["other limits", "the same direction"]
 )
 def test_a_joint_that_is_no_mirror_image_does_not_move_with_the_gripper(second: str, axis: str) -> None:
-    with pytest.raises(GripperGeometryError, match=r"fewer than two of the finger links \['left_pad'\]"):
+    with pytest.raises(GripperGeometryError, match=r"finger links \['left_pad'\] (has no closing|face each)"):
         measure_gripper(jaws(second, axis), "palm", "drive")
+
+
+@pytest.mark.parametrize(
+    ("urdf", "moved"),
+    [(jaws(mimic("drive", 1.0)), 0.0), (jaws(mimic("drive", 0.3)), 0.35 * 0.05), (fixed_jaw(), 0.5 * 0.05)],
+    ids=["equal strokes", "unequal strokes", "a fixed jaw"],
+)
+def test_the_middle_between_the_pads_moves_by_half_the_difference_of_their_strokes(urdf: str, moved: float) -> None:
+    gripper = measure_gripper(urdf, "palm", "drive")
+    for opening in (0.0, gripper.max_opening):
+        expected = [0.0, moved * opening / gripper.max_opening, 0.05]
+        assert gripper.axes @ gripper.pad_centre_at(opening) == pytest.approx(expected, abs=1e-9)
+    assert gripper.is_symmetric == (moved == 0.0)
+    assert gripper.position_for(0.0) == pytest.approx(0.0), "the gap closes towards the fixed jaw"
+    assert gripper.pad_half_width == pytest.approx(0.01) and gripper.pad_half_height == pytest.approx(0.025)
+
+
+def test_a_fixed_jaw_counts_as_a_finger_in_front() -> None:
+    gripper = measure_gripper(fixed_jaw(), "palm", "drive")
+    assert gripper.tips == pytest.approx(np.full(len(gripper.tips), 0.065 + 0.09 / 2))
+    assert {part.link for part in gripper.parts if part.is_pad} == {"left_pad", "right_pad"}
+
+
+def test_jaws_whose_hulls_overlap_over_the_whole_stroke_are_refused() -> None:
+    wide = fixed_jaw().replace('size="0.03 0.02 0.09"', 'size="0.03 0.2 0.09"')
+    with pytest.raises(GripperGeometryError, match="'left_pad' and 'right_pad' overlap .* into convex elements"):
+        measure_gripper(wide, "palm", "drive")
 
 
 @pytest.mark.parametrize("size", [0.02, 0.05, 0.1])

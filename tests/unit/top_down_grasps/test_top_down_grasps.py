@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import random
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,6 +30,9 @@ from modular_framework_core.grasp_generation.planning_scene_objects import (
 )
 from modular_framework_core.grasp_generation.surface_points import Surface
 from top_down_grasps.top_down import TopDownSettings, top_down_grasps
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from two_finger_hands import fixed_jaw  # noqa: E402
 
 UP = np.array([0.0, 0.0, 1.0])
 SETTINGS = TopDownSettings()
@@ -94,6 +98,15 @@ def test_the_best_grasp_of_a_box_closes_across_its_narrow_side_over_its_centre(
     assert best.position[:2] == pytest.approx((0.05, 0.5), abs=1e-6)
     assert len(grasps) > 2
     assert [g.quality for g in grasps] == sorted((g.quality for g in grasps), reverse=True)
+
+
+def test_a_jaw_that_moves_and_one_that_is_fixed_advance_at_equal_distances_from_the_object() -> None:
+    gripper = measure_gripper(fixed_jaw(), "tool", "slide")
+    best = top_down_grasps(on_table(surface_points.box((0.02, 0.05, 0.1)), 0.05, 0.5), TABLE, gripper, SETTINGS)[0]
+    opening = best.pregrasp_joint  # the fixed jaw is at the grasp frame
+    closing = np.array([math.cos(best.yaw), math.sin(best.yaw)])
+    assert np.array(best.position[:2]) + opening / 2 * closing == pytest.approx([0.05, 0.5], abs=1e-3)
+    assert abs(closing) == pytest.approx([1.0, 0.0], abs=1e-6)
 
 
 def test_a_long_box_is_grasped_across_and_one_that_is_wide_both_ways_not_at_all(gripper: GripperGeometry) -> None:

@@ -34,7 +34,7 @@ def grasp_request(query: GraspQuery, frame: str, robot: RobotState, camera: Came
             max_opening=gripper.max_opening,
             pad_width=2 * gripper.pad_half_width,
             pad_height=2 * gripper.pad_half_height,
-            fingertip=float((gripper.tips - gripper.pad_centres).max()),
+            fingertip=float((gripper.tips - gripper.pad_centres[:, 2]).max()),
         ),
         robot=robot,
         seed=query.seed,
@@ -62,13 +62,14 @@ def grasp_candidates(grasps: Grasps, gripper: GripperGeometry, settings: HandMot
     order = np.argsort(-grasps.scores, kind="stable")
     return [
         GraspCandidate(
-            position=pose[:3, 3] - gripper.pad_centre_at(width) * pose[:3, 2],
+            position=pose[:3, 3] - pose[:3, :3] @ gripper.object_centre(width, opening),
             hand_axes=pose[:3, :3],
-            pregrasp_joint=gripper.position_for(min(width + 2 * settings.finger_clearance_m, gripper.max_opening)),
+            pregrasp_joint=gripper.position_for(opening),
             approach_distance_m=settings.approach_distance_m,
             lift_distance_m=settings.lift_distance_m,
             quality=float(score),
         )
         for pose, width, score in zip(grasps.poses[order], grasps.widths[order], grasps.scores[order], strict=True)
         if width <= widest
+        for opening in [min(float(width) + 2 * settings.finger_clearance_m, gripper.max_opening)]
     ]

@@ -181,7 +181,8 @@ def _grasp_at(
     if alignment < settings.min_side_alignment:
         return None
     middle = (hold.low + hold.high) / 2
-    position = flat.in_world(middle, y_grasp, hold.z)
+    pads = gripper.pad_centre_at(hold.opening)
+    position = flat.in_world(middle - pads[0], y_grasp - pads[1], hold.z)
     quality = _quality(
         alignment=alignment,
         offset_m=math.dist((middle, y_grasp, hold.pad_z), flat.centroid),
@@ -225,7 +226,7 @@ def _highest_hold(
     between = np.abs(flat.y - y_grasp) <= gripper.pad_half_width
     if not between.any():
         return None
-    pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
+    pad_offset = float(gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))[2])
     top = float(flat.z[np.abs(flat.y - y_grasp) <= gripper.pad_half_width + 0.01].max())
     z = max(
         min(flat.centroid[2], top - gripper.pad_half_height / 2) + pad_offset,

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Computes opening and convex parts of a two-finger gripper per joint position, from the robot description.
 
-The pads are identified by their motion, not by names or the kinematic tree. Among the pairs of facing moving parts
-whose gap changes most over the stroke, the pads are the innermost pair. The innermost parts alone are no criterion: in
-a four-bar finger they can be knuckles whose gap hardly changes (Robotiq 2F-85).
+The pads are identified by their motion, not by names or the kinematic tree. Among the pairs of facing parts whose gap
+changes most over the stroke, the pads are the innermost pair. The innermost parts alone are no criterion: in a four-bar
+finger they can be knuckles whose gap hardly changes (Robotiq 2F-85). One of the pads may be fixed to the palm, and the
+strokes of the pads may differ; the middle between the pads then depends on the opening.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from modular_framework_urdf.xml_text import XmlError
 Array = npt.NDArray[np.float64]
 STROKE_SAMPLES = 200
 FULL_STROKE = 0.9  # minimum stroke of the pads, as a fraction of the longest stroke of all pairs
+SYMMETRY_M = 1.0e-3  # maximum motion of the middle between the pads of a symmetric hand
 
 
 class GripperGeometryError(ValueError):
@@ -73,7 +75,7 @@ class GripperGeometry:
         axes: Axes of the hand frame in the grasp frame, as columns, shape (3, 3).
         positions: Joint positions from the lower to the upper limit, shape (n,) [rad or m].
         openings: Free width between the pads, shape (n,) [m].
-        pad_centres: z of the pad centres, shape (n,) [m].
+        pad_centres: Midpoints between the pads, shape (n, 3) [m].
         tips: z of the foremost point of the fingers, shape (n,) [m].
         pad_half_width: Half the width of a pad along y [m].
         pad_half_height: Half the height of a pad along z [m].
@@ -96,6 +98,11 @@ class GripperGeometry:
         return float(self.openings.max())
 
     @property
+    def is_symmetric(self) -> bool:
+        """Whether both pads move by the same distance."""
+        return float(np.ptp(self.pad_centres[:, 0])) < SYMMETRY_M
+
+    @property
     def closed_position(self) -> float:
         """Joint position with the minimum free width [rad or m]."""
         return float(self.positions[int(np.argmin(self.openings))])
@@ -110,10 +117,23 @@ class GripperGeometry:
         order = np.argsort(self.openings)
         return float(np.interp(opening, self.openings[order], self.positions[order]))
 
-    def pad_centre_at(self, opening: float) -> float:
-        """Returns z of the pad centres [m] at a free width [m]."""
+    def pad_centre_at(self, opening: float) -> Array:
+        """Returns the midpoint between the pads at a free width [m], shape (3,) [m]."""
         order = np.argsort(self.openings)
-        return float(np.interp(opening, self.openings[order], self.pad_centres[order]))
+        widths = self.openings[order]
+        return np.array([np.interp(opening, widths, self.pad_centres[order, axis]) for axis in range(3)])
+
+    def object_centre(self, width: float, opening: float) -> Array:
+        """Returns the point of the hand at which an object is centred during the approach, shape (3,) [m].
+
+        Both pads have the same distance from the object during the approach, also if only one of them moves. The height
+        is that of the pads at contact.
+
+        Args:
+            width: Width of the object between the pads [m].
+            opening: Free width between the pads during the approach [m].
+        """
+        return np.array([*self.pad_centre_at(opening)[:2], self.pad_centre_at(width)[2]])
 
     def lowest_heights(self, openings: Array, top: Array, margin: float, with_pads: bool, floor: float) -> Array:
         """Computes the lowest collision-free heights of the hand over an object.
@@ -124,7 +144,7 @@ class GripperGeometry:
         Args:
             openings: Free widths between the pads, shape (n,) [m].
             top: Highest points of the object, shape (m, 3) [m]: x along the closing direction and y across, relative
-                to the middle of the hand; z upwards.
+                to the midpoint between the pads; z upwards.
             margin: Clearance around each part [m].
             with_pads: Whether the pads are included; they touch the object at the end of the motion.
             floor: Lower bound of the result [m].
@@ -139,7 +159,9 @@ class GripperGeometry:
                 continue
             near = top[top[:, 2] > floor - float(part.corners[samples, :, 2].max()) - 2 * margin]
             if len(near):
-                fronts = max_z_on_lines(part.planes[samples], near[:, :2], margin)
+                planes = part.planes[samples]
+                planes[:, :, 3] += np.einsum("nmi,ni->nm", planes[:, :, :2], self.pad_centres[samples, :2])
+                fronts = max_z_on_lines(planes, near[:, :2], margin)
                 heights = np.maximum(heights, (fronts + near[:, 2]).max(axis=1))
         return heights
 
@@ -186,19 +208,27 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     positions = np.linspace(limit.lower, limit.upper, STROKE_SAMPLES)
     moving = model.moving_links(joint)
     parts = list(_hand_parts(model, grasp_link, joint, positions))
-    axes = _hand_axes(parts, moving, model.origin_of_fingers(grasp_link, joint))
+    jaws = _find_jaws(parts, moving)
+    axes = _hand_axes(parts, moving, jaws, model.origin_of_fingers(grasp_link, joint))
     parts = [part.in_axes(axes) for part in parts]
-    fingers = [part for part in parts if part.link in moving]
-    right, left = _pads(fingers)
-    openings = np.maximum(right.corners[:, :, 0].min(axis=1) - left.corners[:, :, 0].max(axis=1), 0.0)
-    low, high = right.corners.min(axis=1), right.corners.max(axis=1)
-    half = (high - low)[int(np.argmin(np.abs(openings - openings.max() / 2)))] / 2
+    right, left = _pads(parts, moving, jaws)
+    gaps = right.corners[:, :, 0].min(axis=1) - left.corners[:, :, 0].max(axis=1)
+    if gaps.max() <= 0.0:
+        raise GripperGeometryError(
+            f"the convex hulls of the links '{right.link}' and '{left.link}' overlap over the whole stroke of the "
+            f"joint '{joint}'; split the collision shapes of each jaw into convex elements"
+        )
+    low = np.maximum(right.corners.min(axis=1), left.corners.min(axis=1))
+    high = np.minimum(right.corners.max(axis=1), left.corners.max(axis=1))
+    half_open = int(np.argmin(np.abs(gaps - gaps.max() / 2)))
+    half = np.maximum(high - low, 0.0)[half_open] / 2
+    fingers = [part for part in parts if part.link in moving or part is right or part is left]
     return GripperGeometry(
         joint=joint,
         axes=axes,
         positions=positions,
-        openings=openings,
-        pad_centres=(low[:, 2] + high[:, 2]) / 2,
+        openings=np.maximum(gaps, 0.0),
+        pad_centres=(low + high) / 2,
         tips=np.max([part.corners[:, :, 2].max(axis=1) for part in fingers], axis=0),
         pad_half_width=float(half[1]),
         pad_half_height=float(half[2]),
@@ -206,47 +236,89 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     )
 
 
-def _hand_axes(parts: list[HandPart], moving: list[str], origin: Array) -> Array:
-    """Returns the axes of the hand in the grasp frame, from the two moving parts whose distance changes most.
+@dataclass(frozen=True, slots=True)
+class _Jaws:
+    """The two parts whose distance changes most; at least one of them moves.
+
+    Attributes:
+        first, second: Indices of the parts.
+        open_sample: Sample at which the distance is largest.
+        closed_sample: Sample at which the distance is smallest.
+    """
+
+    first: int
+    second: int
+    open_sample: int
+    closed_sample: int
+
+
+def _find_jaws(parts: list[HandPart], moving: list[str]) -> _Jaws:
+    """Returns the two parts whose distance changes most.
+
+    Args:
+        parts: Parts of the hand.
+        moving: Finger links.
+    """
+    is_moving = np.array([part.link in moving for part in parts], dtype=bool)
+    if len(parts) < 2 or not is_moving.any():
+        raise GripperGeometryError(
+            f"the finger links {moving} and their parent link have {len(parts)} collision shapes, of which "
+            f"{int(is_moving.sum())} move; give each jaw a collision element"
+        )
+    centres = np.array([part.corners.mean(axis=1) for part in parts])  # (parts, samples, 3)
+    distances = np.linalg.norm(centres[:, None] - centres[None, :], axis=3)
+    strokes = np.where(is_moving[:, None] | is_moving[None, :], np.ptp(distances, axis=2), 0.0)
+    first, second = (int(index) for index in np.unravel_index(np.argmax(strokes), strokes.shape))
+    apart = distances[first, second]
+    return _Jaws(first, second, int(np.argmax(apart)), int(np.argmin(apart)))
+
+
+def _hand_axes(parts: list[HandPart], moving: list[str], jaws: _Jaws, origin: Array) -> Array:
+    """Returns the axes of the hand in the grasp frame, from the relative motion of the jaws.
 
     Args:
         parts: Parts of the hand in the grasp frame.
         moving: Finger links.
+        jaws: The two parts whose distance changes most.
         origin: Origin of the parent link of the fingers, shape (3,) [m]; replaces a palm without collision shapes.
     """
-    centres = np.array([part.corners.mean(axis=1) for part in parts if part.link in moving])  # (parts, samples, 3)
-    palm = [part.corners for part in parts if part.link not in moving]
-    if len(centres) < 2:
-        raise GripperGeometryError(
-            f"fewer than two of the finger links {moving} have collision shapes; give each a collision element"
-        )
-    distances = np.linalg.norm(centres[:, None] - centres[None, :], axis=3)
-    first, second = np.unravel_index(np.argmax(np.ptp(distances, axis=2)), distances.shape[:2])
-    sample = int(np.argmax(distances[first, second]))
+    first, second = (parts[index].corners.mean(axis=1) for index in (jaws.first, jaws.second))
+    apart = second - first
+    palm = [
+        part.corners[jaws.open_sample]
+        for index, part in enumerate(parts)
+        if part.link not in moving and index not in (jaws.first, jaws.second)
+    ]
+    centre = np.concatenate(palm).mean(axis=0) if palm else origin
+    ahead = (first + second)[jaws.open_sample] / 2 - centre
     try:
-        centre = np.concatenate([each[sample] for each in palm]).mean(axis=0) if palm else origin
-        return hand_axes(centres[[first, second], sample], centre)
+        return hand_axes(ahead, apart[jaws.open_sample] - apart[jaws.closed_sample])
     except ValueError as error:
-        raise GripperGeometryError(f"the hand has no closing direction: {error}") from error
+        raise GripperGeometryError(
+            f"the hand with the finger links {moving} has no closing direction: {error}; name the joint that moves a "
+            "jaw"
+        ) from error
 
 
-def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
+def _pads(parts: list[HandPart], moving: list[str], jaws: _Jaws) -> tuple[HandPart, HandPart]:
     """Returns the pad on the positive side and the pad on the negative side of the closing direction x."""
-    spread = max(
-        range(STROKE_SAMPLES), key=lambda sample: np.ptp([part.corners[sample, :, 0].mean() for part in fingers])
-    )
-    right = [part for part in fingers if part.corners[spread, :, 0].mean() > 0]
-    left = [part for part in fingers if part.corners[spread, :, 0].mean() <= 0]
+    spread = jaws.open_sample
+    moving_jaws = sum(parts[index].link in moving for index in (jaws.first, jaws.second))
+    middle = sum(parts[index].corners[spread, :, 0].mean() for index in (jaws.first, jaws.second)) / 2
+    right = [part for part in parts if part.corners[spread, :, 0].mean() > middle]
+    left = [part for part in parts if part.corners[spread, :, 0].mean() <= middle]
     gaps = {
         (one, other): part.corners[:, :, 0].min(axis=1) - partner.corners[:, :, 0].max(axis=1)
         for one, part in enumerate(right)
         for other, partner in enumerate(left)
-        if _face_each_other(part.corners[spread], partner.corners[spread])
+        if (part.link in moving) + (partner.link in moving) == moving_jaws
+        and _face_each_other(part.corners[spread], partner.corners[spread])
     }
     if not gaps:
         raise GripperGeometryError(
-            f"no two of the finger links {sorted({part.link for part in fingers})} face each other across the closing "
-            "direction; give each finger a collision element"
+            f"no two of the finger links {sorted({part.link for part in parts if part.link in moving})} face each "
+            "other across the closing direction, and none faces a link that is fixed to their parent link; give each "
+            "jaw a collision element"
         )
     longest = max(np.ptp(gap) for gap in gaps.values())
     chosen = min(

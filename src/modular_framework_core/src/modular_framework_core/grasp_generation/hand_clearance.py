@@ -78,7 +78,7 @@ def lowest_height(top: Array, passage: Passage, desired: float, gripper: Gripper
     """Returns the lowest collision-free height of the hand, and the smallest opening that reaches this height.
 
     Args:
-        top: Highest points of the object, relative to the middle of the hand, shape (n, 3) [m].
+        top: Highest points of the object, relative to the midpoint between the pads, shape (n, 3) [m].
         passage: Part of the object between the pads.
         desired: Desired height of the grasp frame [m]; lower bound of the result.
         gripper: Geometry of the hand.

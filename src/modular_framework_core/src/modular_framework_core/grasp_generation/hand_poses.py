@@ -117,7 +117,7 @@ def place_hand(
         settings: Settings of the hand pose.
     """
     view = _PairView.along(pair, axes, surface, gripper, settings)
-    pad_offset = gripper.pad_centre_at(pair.width)
+    pad_offset = float(gripper.pad_centre_at(pair.width)[2])
     farthest = pad_offset + gripper.pad_half_height - settings.min_pad_overlap_m / 2
     height = pad_offset
     for _ in range(HEIGHT_ROUNDS):
@@ -208,7 +208,8 @@ class _PairView:
         samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
         samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
         reach = min(float((part.corners[samples] @ axes[2]).min()) for part in gripper.parts)
-        middle_z = float(self.pair.middle[2] + hold.passage.middle * axes[2, 0])
+        sideways = [hold.passage.middle, 0.0] - gripper.pad_centre_at(opening)[:2]
+        middle_z = float(self.pair.middle[2] + axes[2, :2] @ sideways)
         missing = support_z + self.settings.tip_clearance_m - (middle_z + reach)
         lift = -float(axes[2, 2])
         if lift > LEVEL:
@@ -217,8 +218,9 @@ class _PairView:
 
     def pose(self, hold: _PairHold, height: float, opening: float) -> HandPose:
         frame = self.axes * [1.0, -1.0, -1.0]
+        pads = self.gripper.pad_centre_at(opening)
         return HandPose(
-            position=self.pair.middle + frame @ [hold.passage.middle, 0.0, height],
+            position=self.pair.middle + self.axes @ [hold.passage.middle - pads[0], -pads[1], -height],
             axes=self.axes,
             contacts=self.pair.middle + np.array([hold.low, hold.high]) @ frame.T,
             alignment=hold.alignment,

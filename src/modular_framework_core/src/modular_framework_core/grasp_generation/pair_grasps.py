@@ -118,7 +118,7 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
 def candidates_of(
     grasps: Sequence[PairGrasp], gripper: GripperGeometry, settings: PairGraspSettings
 ) -> list[GraspCandidate]:
-    """Returns the candidates of pair grasps: all grasps, then all grasps with the hand rotated by 180 degrees.
+    """Returns the candidates of pair grasps: all grasps, then all grasps with a symmetric hand rotated by 180 degrees.
 
     Args:
         grasps: Grasps at pairs of contacts.
@@ -127,15 +127,16 @@ def candidates_of(
     """
     return [
         GraspCandidate(
-            grasp.pose.position,
+            grasp.pose.position + grasp.pose.axes @ (pads - turn @ pads),
             grasp.pose.axes @ turn,
             gripper.position_for(grasp.pose.opening),
             settings.hand.approach_distance_m,
             settings.hand.lift_distance_m,
             grasp.quality,
         )
-        for turn in (np.eye(3), HALF_TURN)
+        for turn in ((np.eye(3), HALF_TURN) if gripper.is_symmetric else (np.eye(3),))
         for grasp in grasps
+        for pads in [gripper.pad_centre_at(grasp.pose.opening)]
     ]
 
 
@@ -147,14 +148,18 @@ def quality_with_travel(quality: float, joint_travel: float) -> float:
 def _poses_to_try(
     pairs: Sequence[ContactPair], query: GraspQuery, settings: PairGraspSettings
 ) -> Iterator[tuple[ContactPair, np.ndarray]]:
-    """Yields pairs with axes of the hand; alternates between inclinations, well aligned and centred pairs first."""
+    """Yields pairs with axes of the hand; alternates between inclinations, well aligned and centred pairs first.
+
+    A hand that is not symmetric is also tried with the pads exchanged.
+    """
     centroid = query.target.surface.centroid
+    turns = (np.eye(3),) if query.gripper.is_symmetric else (np.eye(3), HALF_TURN)
     tries = []
     for pair in pairs:
         score = settings.squareness(pair.alignment) + _centring_quality(pair.distance_from(centroid))
         for axes in hand_axes_for(pair.axis, settings.hand):
             angle = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
-            tries.append((angle, score, (pair, axes)))
+            tries += [(angle, score, (pair, axes @ turn)) for turn in turns]
     yield from _interleave_angle_bins(tries, settings)
 
 
