@@ -282,6 +282,31 @@ def test_fingers_with_equal_axes_and_opposite_limits_are_a_gripper(package_path:
     assert made.states()["gripper open"] == {"slide_a": 0.04}
 
 
+@pytest.mark.parametrize(("axis", "opened"), [("0 1 0", 0.04), ("0 -1 0", -0.04)], ids=["along", "against"])
+def test_a_jaw_opens_away_from_a_fixed_jaw_and_the_grasp_frame_is_between_them(
+    axis: str, opened: float, package_path: Path
+) -> None:
+    slide_a = joint("slide_a", "palm", "finger_a", "0 0 0.041", kind="prismatic")
+    slide_b = joint("slide_b", "palm", "finger_b", "0 0 0.041", "0 -1 0", "prismatic")
+    moving = slide_a.replace("0 1 0", axis)
+    if opened < 0.0:
+        moving = moving.replace('lower="0" upper="0.04"', 'lower="-0.04" upper="0"')
+    text = CRANE.replace(slide_a, moving).replace(slide_b, joint("b", "palm", "finger_b", "0 0 0.041", kind="fixed"))
+    made = make("crane_1", package_path, write(package_path, text), "--gripper", "finger_a", "--samples", "100")
+    assert check_package(made.config) == ()
+    states = made.states()
+    assert states["gripper open"] == {"slide_a": opened}
+    assert states["gripper closed"]["slide_a"] == pytest.approx(0.0, abs=6e-4)
+    origin = ElementTree.fromstring(made.text()).find("joint[@name='gripper_grasp_frame_joint']/origin")
+    assert origin is not None
+    middle = (0.04 + 0.005 - 0.005) / 2
+    assert list(map(float, origin.get("xyz", "").split()))[:2] == pytest.approx([0.0, middle], abs=1e-3)
+    turn = pinocchio.rpy.rpyToMatrix(*map(float, origin.get("rpy", "").split()))
+    assert abs(turn[:, 0]) == pytest.approx([0.0, 1.0, 0.0], abs=1e-4)
+    pair = made.srdf().find("disable_collisions[@link1='finger_a'][@link2='finger_b']")
+    assert pair is not None and pair.get("reason") == "Default"
+
+
 def test_the_grasp_frame_of_fingers_on_two_links_each_is_straight_and_in_the_middle(package_path: Path) -> None:
     made = make("crane_1", package_path, write(package_path, four_bar_crane()), "--samples", "100")
     origin = ElementTree.fromstring(made.text()).find("joint[@name='gripper_grasp_frame_joint']/origin")

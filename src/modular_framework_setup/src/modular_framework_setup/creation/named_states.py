@@ -53,7 +53,9 @@ def pad_travel(sampling: CollisionSampling, gripper: Gripper, opened: float, clo
     if not pairs or opened == closed:
         return 0.0
     wide, narrow = (_gap(sampling, gripper, pairs, position) for position in (opened, closed))
-    return max(0.0, 0.5 * (wide - narrow) / abs(opened - closed))
+    children = sampling.model.document.joint_children
+    moving_fingers = {finger_of(sampling.model, gripper, children[name]) for name in gripper.joints}
+    return max(0.0, (wide - narrow) / min(2, len(moving_fingers)) / abs(opened - closed))
 
 
 def _gap(sampling: CollisionSampling, gripper: Gripper, pairs: list[Pair], position: float) -> float:

@@ -27,7 +27,7 @@ class Gripper:
         palm: Parent link of the fingers.
         driver: Commanded joint.
         joints: All joints, the driver first.
-        links: Links of the fingers.
+        links: Links of the fingers, including the fixed jaw beside a single moving finger.
         twin: Second finger joint that must mimic the driver but has no <mimic> in the URDF; "" for none.
         twin_multiplier: Multiplier of the <mimic> of the twin.
     """
@@ -168,6 +168,9 @@ def _gripper(tree: RobotTree, joints: Sequence[Joint]) -> Gripper:
     names = {joint.name for joint in joints}
     links = [joint.child for joint in joints]
     links += [joint.child for link in links for joint in joints_below(tree, link) if joint.name not in names]
+    roots = {next(above.name for above in tree.up(joint.child) if above.parent == palm) for joint in joints}
+    if len(roots) == 1:
+        links += _fixed_jaws(tree, palm)
     ordered = [drivers[0].name, *(joint.name for joint in joints if joint is not drivers[0])]
     twin = drivers[1].name if len(drivers) == 2 == len(joints) else ""
     multiplier = mirror_multiplier(*drivers) or 1.0 if twin else 1.0
@@ -178,6 +181,15 @@ def _gripper(tree: RobotTree, joints: Sequence[Joint]) -> Gripper:
             "<mimic> to the URDF, or name the fingers by --gripper"
         )
     return Gripper("gripper", palm, drivers[0].name, tuple(ordered), tuple(dict.fromkeys(links)), twin, multiplier)
+
+
+def _fixed_jaws(tree: RobotTree, palm: str) -> list[str]:
+    """Returns the links with shapes that are fixed to a palm and farther from the base."""
+    jaws = []
+    for joint in tree.children(palm):
+        if joint.kind == "fixed":
+            jaws += [joint.child, *_fixed_jaws(tree, joint.child)]
+    return [link for link in jaws if tree.links[link].collisions]
 
 
 def _ancestors(tree: RobotTree, link: str) -> Iterable[str]:
