@@ -62,6 +62,9 @@ class TestExternalGrasps(GraspGeneratorConformance):
         opening = 0.12 - 0.01 - 2 * best.pregrasp.posture.position[0]
         assert opening == pytest.approx(0.04 + 2 * 0.012, abs=1e-3)
 
+    def test_the_node_says_the_digest_of_the_sources_of_the_method(self) -> None:
+        assert len(rospy.get_param(f"{self.node}/method_sources")) == 64
+
     def report_of_a_generation(self) -> dict[str, Any]:
         """Requests grasps from the generator, and returns the report of the component."""
         reports: list[dict[str, Any]] = []

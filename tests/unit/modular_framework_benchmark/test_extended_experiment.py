@@ -191,6 +191,37 @@ def test_packages_of_nodes_and_versions_of_libraries_count(stack: Stack) -> None
     assert {"package top_down_grasps", "package modular_framework_planning", "Python package numpy"} <= set(digests)
 
 
+@pytest.mark.parametrize("mode", ["task", "grasps"])
+def test_the_python_files_beside_the_script_of_an_external_method_count(
+    stack: Stack, tmp_path: Path, mode: str
+) -> None:
+    script = tmp_path / "my_grasps" / "method.py"
+    for name in ("method.py", "helper.py", "networks/encoder.py", "data/weights.txt", ".venv/lib/numpy.py"):
+        (script.parent / name).parent.mkdir(parents=True, exist_ok=True)
+        (script.parent / name).write_text("1")
+    command = ["/usr/bin/python3", str(script), "--fast"]
+
+    def folder_digest() -> str:
+        settings = GraspSettings(method="a.b:C", method_parameters={"command": command})
+        if mode == "grasps":
+            return run_digests([EpisodeSpec(0, {}, 0, 1, settings)])["folder of my_grasps/method.py"]
+        stack.launch.write_text(stack.launch.read_text().replace("<param", f"<rosparam>method: {{command: {command}}}"
+                                "</rosparam><param", 1))  # fmt: skip
+        return stack.digests()["folder of my_grasps/method.py"]
+
+    before = folder_digest()
+    for name, counts in (
+        ("helper.py", True),
+        ("networks/encoder.py", True),
+        ("data/weights.txt", False),
+        (".venv/lib/numpy.py", False),
+    ):
+        (script.parent / name).write_text("2")
+        after = folder_digest()
+        assert (after != before) == counts, name
+        before = after
+
+
 def test_a_mode_without_launch_counts_its_robot_and_method() -> None:
     method = "top_down_grasps.ros_top_down_node:TopDownMethod"
     settings = GraspSettings(robot="ur5_ezgripper_moveit_config", method=method)

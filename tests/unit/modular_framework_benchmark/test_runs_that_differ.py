@@ -259,6 +259,12 @@ def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_p
     assert "8 attempts ended without a record, and the episodes ran again: begun 2026-11-26 on lab-1" in text
 
 
+def test_a_report_warns_of_methods_whose_sources_are_unknown(tmp_path: Path) -> None:
+    text = warnings(stored(tmp_path / "results.db", unknown_sources=["ws://127.0.0.1:8700"]))
+    assert "8 episodes ran with a method whose sources are unknown" in text and "ws://127.0.0.1:8700" in text
+    assert warnings(stored(tmp_path / "known.db", unknown_sources=[])) == ""
+
+
 def test_a_report_warns_of_real_times_beside_other_workers_of_the_run(tmp_path: Path) -> None:
     text = warnings(stored(tmp_path / "results.db", worker_count=2, workers_share=0.45))
     assert text == (

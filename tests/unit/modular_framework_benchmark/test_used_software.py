@@ -78,6 +78,22 @@ def test_the_digests_cover_the_files_in_the_command_of_an_external_method(tmp_pa
     assert digests == {f"method file {tmp_path.name}/method.py": hashlib.sha256(b"serve()").hexdigest()}
 
 
+def test_a_record_says_the_sources_of_an_external_method_and_which_are_unknown(tmp_path: Path) -> None:
+    script = tmp_path / "my_grasps" / "method.py"
+    parameters = {
+        "narrow": {"command": ["/opt/own/bin/python", str(script), "--fast"], "address": "", "method_sources": "aa"},
+        "remote": {"command": [], "address": "ws://127.0.0.1:8700"},
+        "top_down": {"yaw_step": 0.1},
+    }
+    ran = running_stack(parameters, {}, ["/narrow", "/remote", "/top_down"], [])
+    snapshot = record_of(tmp_path, json.loads(json.dumps(asdict(ran)))).snapshot
+    assert snapshot["methods"] == {
+        "bin/python my_grasps/method.py --fast": {"version": "", "sources": "aa"},
+        "ws://127.0.0.1:8700": {"version": "", "sources": ""},
+    }
+    assert snapshot["unknown_sources"] == ("ws://127.0.0.1:8700",)
+
+
 MESH = "<visual name='v'><geometry><mesh{}</mesh></geometry></visual>"
 
 

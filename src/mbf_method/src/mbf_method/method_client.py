@@ -99,6 +99,8 @@ class MethodClient:
     """Starts or connects to a method, and sends requests. After a fault, the next call starts or connects again.
 
     Attributes:
+        sources: SHA-256 of the sources that the method's process has imported; known after `start`, "" if the method
+            does not report them.
         needs_camera: Whether requests must contain camera images; known after `start`.
 
     Args:
@@ -113,6 +115,7 @@ class MethodClient:
         self._limits = limits
         self._process: MethodProcess | None = None
         self._connection: ClientConnection | None = None
+        self.sources = ""
         self.needs_camera = False
 
     def start(self) -> None:
@@ -223,6 +226,7 @@ class MethodClient:
                 f"the server at {address} says protocol {found[0]!r}, version {found[1]!r}, kind {found[2]!r}; "
                 f"required: {PROTOCOL!r}, {VERSION}, {self._kind!r}; install the package mbf_method of this framework"
             )
+        self.sources = str(greeting.get("sources", ""))
         self.needs_camera = bool(greeting.get("needs_camera"))
 
     def _exchange(self, request: bytes, limit_s: float, is_cancelled: Callable[[], bool] | None) -> Any:

@@ -18,6 +18,7 @@ from mbf_method.grasp_request import GraspRequest
 from mbf_method.grasps import Grasps
 from mbf_method.joint_path import JointPath
 from mbf_method.path_request import PathRequest
+from mbf_method.source_digest import source_digest
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
 PORT_VARIABLE = "MBF_METHOD_PORT"
@@ -137,6 +138,7 @@ class _Handler:
                         "kind": self._method.kind,
                         "name": self._method.function.__name__,
                         "needs_camera": self._method.needs_camera,
+                        "sources": source_digest(),
                     }
                 )
             )

@@ -67,6 +67,8 @@ PLANNER_METHOD_TIME, PLANNER_QUEUE_TIME, PLANNER_TRANSPORT_TIME, PLANNER_FAULT =
     replace(figure, component="planning") for figure in (METHOD_TIME, QUEUE_TIME, TRANSPORT_TIME, METHOD_FAULT)
 )
 """The same figures of a planner."""
+SOURCES_PARAMETER = "method_sources"
+"""Private parameter with the digest of the sources of an external method, set by its node."""
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
 PROCESSOR_TIME = Figure("processor_s", "planning", "s", "Processor time of the plan.", Clock.PROCESSOR, Source.MEASURED)
 CONCURRENT = Figure(

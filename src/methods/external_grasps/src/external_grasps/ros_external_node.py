@@ -28,6 +28,7 @@ from modular_framework_ros.reported_figures import (
     METHOD_FAULT,
     METHOD_TIME,
     QUEUE_TIME,
+    SOURCES_PARAMETER,
     TRANSPORT_TIME,
     Figure,
 )
@@ -53,6 +54,7 @@ class ExternalMethod(ParameterisedMethod):
 
     Parameters: those of :func:`read_external_settings`, ``~max_candidates``, ``~camera_timeout`` and the distances of
         the hand motion, read again for every object; ``origin_frame_name``.
+    Parameters set by the node, for records: ``~method_sources``, see :attr:`sources`.
     Subscribers: ``joint_states`` (sensor_msgs/JointState); see :class:`CameraSource`.
     """
 
@@ -68,6 +70,7 @@ class ExternalMethod(ParameterisedMethod):
         self._times: list[CallTimes] = []
         self._fault: MethodFault | None = None
         self._camera = CameraSource()
+        self._recorded_sources = ""
 
     def connect(self) -> None:
         """Subscribes to the joint states and starts the method; a fault is logged."""
@@ -122,6 +125,11 @@ class ExternalMethod(ParameterisedMethod):
         if self._client is not None:
             self._client.close()
 
+    @property
+    def sources(self) -> str:
+        """Digest of the sources in the method's process; "" before its start, or if the method does not report them."""
+        return "" if self._client is None else self._client.sources
+
     def _started_client(self) -> MethodClient:
         """Returns the started client for the current parameters; subscribes to TF if the method needs a camera."""
         settings = read_external_settings(self.read)
@@ -129,6 +137,9 @@ class ExternalMethod(ParameterisedMethod):
             self.close()
             self._client, self._settings = MethodClient(settings.source, GRASPS, settings.limits), settings
         self._client.start()
+        if rospy.core.is_initialized() and self._client.sources != self._recorded_sources:
+            self._recorded_sources = self._client.sources
+            rospy.set_param(f"~{SOURCES_PARAMETER}", self._recorded_sources)
         if self._client.needs_camera:
             self._camera.connect()
         return self._client

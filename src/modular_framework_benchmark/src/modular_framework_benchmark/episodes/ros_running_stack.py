@@ -11,6 +11,7 @@ from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.episodes.ros_external_methods import command_files, method_name
 from modular_framework_benchmark.episodes.ros_file_digests import (
     file_digest,
     files_with_named,
@@ -31,6 +32,7 @@ from modular_framework_benchmark.records.used_software import (
 )
 from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun
+from modular_framework_ros.reported_figures import SOURCES_PARAMETER
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
 FILE_PARAMETERS = {
@@ -38,6 +40,7 @@ FILE_PARAMETERS = {
     "state machine": "/task/state_machine_to_load",
 }
 """Parameters of nodes that name files, keyed by kind of file."""
+EXTERNAL_PARAMETERS = ("command", "address", SOURCES_PARAMETER)
 NODE_TIMEOUT_S = 5.0
 KINEMATICS_PARAMETER = "/robot_description_kinematics"
 DETECTORS = ("/move_group/collision_detector", "/collision_detector")
@@ -61,11 +64,11 @@ def running_stack(
         plans: Planning reports of move_group.
         models: Models of the placed objects: names, or absolute paths of their files.
     """
-    generators = list(generators)
+    generators, controllers = list(generators), dict(controllers)
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
     software = UsedSoftware(
         methods={name: UsedMethod(version, digest) for name, (version, digest) in methods.items()},
-        controllers=dict(controllers),
+        controllers=controllers,
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
         digests=_digests(parameters, controllers, models) | _command_digests(parameters, generators),
@@ -74,6 +77,10 @@ def running_stack(
             *detector_substitutions(next(filter(None, (str(_value(parameters, name)) for name in DETECTORS)), "")),
         ),
     )
+    for node in generators:
+        command, address, sources = (_value(parameters, f"{node}/{name}") for name in EXTERNAL_PARAMETERS)
+        if name := method_name(command, address):
+            software = software.with_external_method(name, str(sources))
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
     return software.with_plans(PlannerRun(**run) for run in runs)
@@ -102,8 +109,7 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
 def _command_digests(parameters: Mapping[str, Any], generators: Iterable[str]) -> dict[str, str]:
     """Returns the SHA-256 of each file in the commands of external methods, keyed by a description of the file."""
     commands = [_value(parameters, f"{node}/command") for node in generators]
-    words = [Path(str(word)) for command in commands if isinstance(command, list) for word in command]
-    paths = [word for word in words if word.is_absolute() and word.is_file()]
+    paths = [path for command in commands for path in command_files(command)]
     return {f"method file {portable_name(path)}": file_digest(path) for path in paths}
 
 

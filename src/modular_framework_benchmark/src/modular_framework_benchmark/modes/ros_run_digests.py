@@ -17,6 +17,7 @@ from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.episodes.ros_external_methods import command_files, command_words, folder_digest
 from modular_framework_benchmark.episodes.ros_file_digests import (
     file_digest,
     files_with_named,
@@ -40,6 +41,7 @@ from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, model_file
 from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combination_key, digests_text
+from modular_framework_core.launching.ros_launch_preview import leaves
 
 FOLDER_PARAMETERS = ("states_directory", "templates_directory")
 """Launch arguments that name folders of the user's code."""
@@ -89,6 +91,8 @@ def _sources(settings: EpisodeSettings) -> Iterator[tuple[str, Callable[[], Dige
         files += [Path(settings.problem.scene), Path(settings.problem.request), *_named_files(settings.parameters)]
     if isinstance(settings, GraspSettings):
         files += _named_files(settings.method_parameters)
+    for command in _commands(settings):
+        yield f"command {command}", functools.partial(_command_digests, command)
     for file in files:
         yield f"file {file}", functools.partial(_file_digests, file, "")
     if isinstance(settings, ModelSettings):
@@ -120,6 +124,24 @@ def _file_digests(file: Path, model_path: str) -> Digests:
     """Yields the digests of a file and of the files that it names; nothing if the file does not exist."""
     if file.is_file():
         yield from _digests_of(files_with_named(file, model_resources(model_path)))
+
+
+def _commands(settings: EpisodeSettings) -> list[tuple[str, ...]]:
+    """Returns the commands of the external methods and planners in the modes without simulation."""
+    parameters: Mapping[str, Any] = {}
+    if isinstance(settings, PlanningSettings):
+        parameters = leaves(dict(settings.parameters))
+    if isinstance(settings, GraspSettings):
+        parameters = settings.method_parameters
+    return [command_words(value) for name, value in parameters.items() if name.rpartition("/")[2] == "command"]
+
+
+def _command_digests(command: Iterable[str]) -> Digests:
+    """Yields the digests of the files in the command of an external method, and of the Python files beside each."""
+    for file in command_files(tuple(command)):
+        yield f"{FILE_PREFIX}{portable_name(file)}", file_digest(file)
+        if file.parent.name != "bin":
+            yield f"folder of {portable_name(file)}", folder_digest(file)
 
 
 def _digests_of(files: Iterable[Path]) -> Digests:
@@ -163,6 +185,9 @@ def _stack_digests(stack: StackPreview, changed: Mapping[str, Any]) -> Digests:
     yield from _digests_of(dict.fromkeys(files))
     for package in {node.package for node in stack.preview.nodes} | named.packages:
         yield from _package_digests(package)
+    for name, value in parameters.items():
+        if name.rpartition("/")[2] == "command":
+            yield from _command_digests(command_words(value))
     for name in FOLDER_PARAMETERS:
         folders = [Path(entry) for entry in str(stack.launch.arguments.get(name, "")).split(os.pathsep) if entry]
         if folders:

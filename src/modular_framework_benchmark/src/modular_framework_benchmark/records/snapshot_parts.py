@@ -20,7 +20,7 @@ class PartKind(Enum):
     VARYING = "varying"  # expected to differ between episodes; neither listed nor compared
 
 
-SETTINGS, REFERENCE = "settings", "reference_s"
+SETTINGS, REFERENCE, UNKNOWN_SOURCES = "settings", "reference_s", "unknown_sources"
 _PARTS: Mapping[PartKind, tuple[str, ...]] = {
     PartKind.SOFTWARE: (
         *("version", "git_revision", "git_changed", "python", "ros_distribution"),
@@ -31,6 +31,7 @@ _PARTS: Mapping[PartKind, tuple[str, ...]] = {
         WORKER_COUNT,
         "solver",
         "substitutions",
+        UNKNOWN_SOURCES,
         "replaced",
         "shake_fault",
         "video_fault",

@@ -36,7 +36,7 @@ class UsedPlanner:
 
 @dataclass(frozen=True, slots=True)
 class UsedMethod:
-    """A grasp generation method: version of its package, and SHA-256 of its sources."""
+    """A method: version of its package, and SHA-256 of its sources; both empty if unknown."""
 
     version: str
     sources: str
@@ -50,7 +50,8 @@ class UsedSoftware:
         planners: Planners, keyed by "PLANNER of PIPELINE".
         solver: Inverse kinematics methods; empty if no pose was solved.
         collision_checker: Classes of the collision checkers as `module/Class`; empty without a plan.
-        methods: Grasp generation methods, keyed by package.
+        methods: Grasp generation methods, keyed by package; methods with their own process also by command or address.
+        unknown_sources: Methods whose process does not report its sources.
         controllers: Types of the running controllers, keyed by name.
         physics_engine: Physics engine of the simulation.
         renderer: Renderer of the cameras; empty without cameras.
@@ -64,6 +65,7 @@ class UsedSoftware:
     solver: str = ""
     collision_checker: str = ""
     methods: Mapping[str, UsedMethod] = field(default_factory=dict)
+    unknown_sources: tuple[str, ...] = ()
     controllers: Mapping[str, str] = field(default_factory=dict)
     physics_engine: str = ""
     renderer: str = ""
@@ -79,6 +81,17 @@ class UsedSoftware:
     def as_json(self) -> dict[str, Any]:
         """Returns the entries of a snapshot."""
         return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
+
+    def with_external_method(self, name: str, sources: str) -> UsedSoftware:
+        """Returns this object with a method that runs in its own process.
+
+        Args:
+            name: Command or address of the method.
+            sources: SHA-256 of the sources, as the process reports it; "" if unknown.
+        """
+        methods = {**self.methods, name: UsedMethod("", sources)}
+        unknown = self.unknown_sources if sources else (*self.unknown_sources, name)
+        return replace(self, methods=methods, unknown_sources=unknown)
 
     def with_plans(self, runs: Iterable[PlannerRun]) -> UsedSoftware:
         """Returns this object with the planners of the given runs.

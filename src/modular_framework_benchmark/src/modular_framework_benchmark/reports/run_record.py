@@ -14,7 +14,7 @@ from modular_framework_benchmark.experiments.design import DRAWN_SETTINGS
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.level_digests import all_digests, combination_key, digests_of
 from modular_framework_benchmark.records.results import ExperimentResults
-from modular_framework_benchmark.records.snapshot_parts import REFERENCE, PartKind, kind_of
+from modular_framework_benchmark.records.snapshot_parts import REFERENCE, UNKNOWN_SOURCES, PartKind, kind_of
 from modular_framework_benchmark.records.used_software import IMPLEMENTATION
 from modular_framework_benchmark.reports.number_text import count_phrase
 from modular_framework_ros.reported_figures import Clock
@@ -146,7 +146,7 @@ def _inconsistent(combinations: CombinationSnapshots) -> Iterator[str]:
 
 
 def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
-    """Yields errors of metrics, and attempts of episodes that ended without a record."""
+    """Yields errors of metrics, methods with unknown sources, and attempts that ended without a record."""
     faults: dict[str, list[tuple[str, int]]] = {}
     for value, episodes in snapshots.get("metric_faults", ()):
         for metric, text in value.items():
@@ -154,6 +154,12 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
     for metric, texts in faults.items():
         count = sum(episodes for _, episodes in texts)
         yield f"The metric {metric} raised an error in {count_phrase(count, 'episode')}: {texts[0][0]}."
+    for methods, episodes in snapshots.get(UNKNOWN_SOURCES, ()):
+        if methods:
+            yield (
+                f"{count_phrase(episodes, 'episode')} ran with a method whose sources are unknown, so a change of the "
+                f"method is not noticed: {', '.join(methods)}. Update its package mbf_method."
+            )
     tries = [text for value, episodes in snapshots.get("earlier_tries", ()) for text in value * episodes]
     if tries:
         yield f"{count_phrase(len(tries), 'attempt')} ended without a record, and the episodes ran again: {tries[0]}."
