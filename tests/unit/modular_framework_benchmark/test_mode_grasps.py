@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from experiment_texts import FakeResources
 
@@ -26,6 +28,8 @@ TOP_DOWN, ANTIPODAL = (
     "top_down_grasps.ros_top_down_node:TopDownMethod",
     "antipodal_grasps.ros_antipodal_node:AntipodalMethod",
 )
+ROOT = Path(__file__).parents[3]
+EXTERNAL = "external_grasps.ros_external_node:ExternalMethod"
 METRICS = ("success", "generation_time", "candidates", "reachable_share", "best_rank")
 GRASPS = """
 experiment: grasps
@@ -142,6 +146,69 @@ def test_settings_that_cannot_be_used_break_the_episode_and_say_what_is_allowed(
     record = generate(runner, tmp_path, [at("cube", cube, 0.45, 0.0, 0.1)], **settings)
     assert record.status is EpisodeStatus.BROKEN
     assert cause in record.cause
+
+
+SLOW_METHOD = """
+import sys
+import time
+
+sys.path.append({package!r})
+
+while time.process_time() < 2.0:
+    pass
+
+from my_grasp_method import narrow_grasps
+from mbf_method import grasp_method
+
+queries = []
+
+
+@grasp_method
+def slow_grasps(request):
+    end_s = time.process_time() + (0.1 if queries else 2.0)  # slow at first, as with lazy imports
+    queries.append(request)
+    while time.process_time() < end_s:
+        pass
+    return narrow_grasps(request)
+
+
+slow_grasps.serve()
+"""
+
+
+def test_the_process_of_a_method_is_kept_and_warm_and_its_processor_time_is_measured(
+    tmp_path: Path, cube: Path
+) -> None:
+    runner = GraspEpisodeRunner()
+    example = ROOT / "docs/examples/my_grasp_method.py"
+    (tmp_path / "my_grasp_method.py").write_text(example.read_text())
+    (tmp_path / "slow_grasps.py").write_text(SLOW_METHOD.format(package=str(ROOT / "src/mbf_method/src")))
+    command = [sys.executable, str(tmp_path / "slow_grasps.py")]
+
+    def processes() -> list[psutil.Process]:
+        return [each for each in psutil.Process().children(recursive=True) if each.cmdline() == command]
+
+    records, kept = [], []
+    for _ in range(2):
+        external = {"method": EXTERNAL, "method_parameters": {"command": command}}
+        objects = [at("cube", cube, 0.45, 0.0, 0.1)]
+        records.append(generate(runner, tmp_path, objects, metrics=("method_processor_time",), **external))
+        kept += processes()
+    runner.close()
+    assert [record.status for record in records] == [EpisodeStatus.SUCCEEDED] * 2, records[0].cause
+    assert len(kept) == 2 and kept[0] == kept[1] and not processes()
+    for record in records:
+        assert 0.1 <= record.metrics["method_processor_time"] < 2.0
+    (name,) = set(records[0].snapshot["methods"]) - {"external_grasps"}
+    assert name.endswith(f"{tmp_path.name}/slow_grasps.py")
+    assert len(records[0].snapshot["methods"][name]["sources"]) == 64
+
+
+def test_the_processor_time_of_a_method_within_the_process_is_measured(
+    runner: GraspEpisodeRunner, tmp_path: Path, cube: Path
+) -> None:
+    record = generate(runner, tmp_path, [at("cube", cube, 0.45, 0.0, 0.1)], metrics=("method_processor_time",))
+    assert 0.0 < record.metrics["method_processor_time"] < 10.0
 
 
 def read(text: str, folder: Path) -> Experiment:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import time
 
 import psutil
 
@@ -25,6 +27,16 @@ def processor_time_s(launch: int) -> float:
             if COMMAND[-1] in process.cmdline():
                 used_s += sum(map(_time_s, [process, *process.children(recursive=True)]))
     return used_s
+
+
+def tree_time_s() -> float:
+    """Returns the processor time of this process and of all its descendants so far [s].
+
+    Ended descendants count if their parent has waited for them.
+    """
+    ended = os.times()
+    descendants = psutil.Process().children(recursive=True)
+    return time.process_time() + ended.children_user + ended.children_system + sum(map(_time_s, descendants))
 
 
 def _children(launch: int) -> list[psutil.Process]:

@@ -23,7 +23,10 @@ def generation_time(episode: EpisodeMeasurements) -> float | None:
 
 
 def method_processor_time(episode: EpisodeMeasurements) -> float | None:
-    """Processor time of the method's processes, children included, until the end of the task [s]."""
+    """Processor time of the method's processes, children included, until the end of the task [s].
+
+    In the mode `grasps`, the time of the search alone.
+    """
     return episode.method_processor_s
 
 

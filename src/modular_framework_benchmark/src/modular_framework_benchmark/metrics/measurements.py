@@ -35,6 +35,7 @@ class ComponentReport:
         started_s: Start in simulated time [s].
         ended_s: End in simulated time [s].
         wall_s: Real duration [s].
+        processor_s: Processor time of a grasp generation method, in the mode `grasps` [s]; None in other modes.
         figures: Reported figures, keyed by declaration such as `CANDIDATES`.
         motion: Planned or executed motion; None without a motion.
         ran: Software that ran, in the modes without simulation.
@@ -48,6 +49,7 @@ class ComponentReport:
     ended_s: float
     _: KW_ONLY
     wall_s: float
+    processor_s: float | None = None
     figures: Mapping[Figure, float] = field(default_factory=dict)
     motion: Motion | None = None
     ran: UsedSoftware = UsedSoftware()

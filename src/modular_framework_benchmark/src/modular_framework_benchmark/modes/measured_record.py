@@ -74,7 +74,14 @@ def measured_record(
     invalid_cause = report.ran.invalid_cause
     status, cause = (EpisodeStatus.INVALID, invalid_cause) if invalid_cause else (status, report.reason)
     measurements = EpisodeMeasurements(
-        spec.settings, status, outcome, cause, generation_s=generation_s, reports=(report,), folder=folder
+        spec.settings,
+        status,
+        outcome,
+        cause,
+        generation_s=generation_s,
+        method_processor_s=report.processor_s,
+        reports=(report,),
+        folder=folder,
     )
     try:
         measured = measure(spec.settings.metrics, measurements)

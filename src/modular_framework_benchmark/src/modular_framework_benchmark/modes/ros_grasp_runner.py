@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.episodes.process_times import tree_time_s
+from modular_framework_benchmark.episodes.ros_external_methods import method_name
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
 from modular_framework_benchmark.metrics.measurements import ComponentReport
@@ -65,7 +67,15 @@ class _GraspSetup:
 
 
 class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
-    """Runs episodes of the mode `grasps`."""
+    """Runs episodes of the mode `grasps`.
+
+    A method is kept between episodes, and answers one query that is not measured before its first episode.
+    """
+
+    def __init__(self) -> None:
+        """Creates empty caches."""
+        super().__init__()
+        self._warm: set[int] = set()
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Generates and checks the grasps of one scene; writes no files."""
@@ -73,11 +83,17 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
         prepared = self.cached_setup(settings)
         scene = grasp_scene(prepared.robot.model, settings.objects, settings.target)
         method = prepared.method
+        if id(method) not in self._warm:
+            self._warm.add(id(method))
+            _candidates(method, scene, prepared.gripper, spec.seed)
+            _take_figures(method)
         if isinstance(method, ProcessMethod):
             method.start()
+        processor_start_s = tree_time_s()
         started_s, start = watch.elapsed_s(), time.perf_counter()
         candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
+        processor_s = tree_time_s() - processor_start_s
         travels = _joint_travels(prepared, scene, candidates[: settings.max_checks])
         reachable = [rank for rank, travel in enumerate(travels, start=1) if travel is not None]
         outcome = "reachable" if reachable else ("out_of_reach" if candidates else "no_grasp")
@@ -89,9 +105,9 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
-            figures=_figures(candidates, travels, reachable)
-            | (method.take_figures() if isinstance(method, MeasuredMethod) else {}),
-            ran=_used_software(settings.method_package, prepared),
+            processor_s=processor_s,
+            figures=_figures(candidates, travels, reachable) | _take_figures(method),
+            ran=_used_software(settings, prepared),
         )
         status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report=report, folder=folder, watch=watch)
@@ -113,18 +129,28 @@ class GraspEpisodeRunner(ModelEpisodeRunner[GraspSettings, _GraspSetup]):
 
     def end(self, prepared: _GraspSetup) -> None:
         """Ends the method's own process."""
+        self._warm.discard(id(prepared.method))
         if isinstance(prepared.method, ProcessMethod):
             prepared.method.close()
 
 
-def _used_software(package: str, prepared: _GraspSetup) -> UsedSoftware:
+def _take_figures(method: GraspMethod) -> dict[Figure, float]:
+    return method.take_figures() if isinstance(method, MeasuredMethod) else {}
+
+
+def _used_software(settings: GraspSettings, prepared: _GraspSetup) -> UsedSoftware:
+    package, parameters = settings.method_package, settings.method_parameters
     version, sources = package_source(package)
-    return UsedSoftware(
+    software = UsedSoftware(
         methods={package: UsedMethod(version, sources)},
         solver=prepared.solver.method,
         substitutions=solver_substitutions([prepared.solver.settings.solver]),
         digests=digests_of(prepared.robot),
     )
+    if isinstance(prepared.method, ProcessMethod):
+        name = method_name(parameters.get("command"), parameters.get("address"))
+        return software.with_external_method(name, prepared.method.sources)
+    return software
 
 
 def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:

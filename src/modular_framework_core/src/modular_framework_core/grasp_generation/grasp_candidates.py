@@ -123,6 +123,10 @@ class ConnectedMethod(Protocol):
 class ProcessMethod(Protocol):
     """Additional interface of a grasp method with a process of its own."""
 
+    @property
+    def sources(self) -> str:
+        """Digest of the sources that the process has imported; "" before the start, or if unknown."""
+
     def start(self) -> None:
         """Starts the process in advance, no effect while it runs; a fault is logged and raised by `candidates`."""
 
