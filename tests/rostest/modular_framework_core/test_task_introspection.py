@@ -15,6 +15,7 @@ import pytest
 import rosgraph
 import rospy
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from std_srvs.srv import Trigger
 
 from modular_framework_testing.ros_session import RosSession
 
@@ -77,6 +78,10 @@ class Viewer:
     def _on_structure(self, message: SmachContainerStructure) -> None:
         self.structure[message.path] = message
 
+    def close(self) -> None:
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
     def active(self, path: str) -> list[str]:
         return sorted(self.status[path].active_states) if path in self.status else ["not seen"]
 
@@ -90,21 +95,45 @@ def until(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     return True
 
 
-@pytest.fixture()
-def task(ros_session: RosSession, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+def start_task(ros_session: RosSession, tmp_path: Path, *arguments: str) -> subprocess.Popen[str]:
     (tmp_path / "stay.py").write_text(STAY)
     if rospy.has_param("/go_on"):
         rospy.delete_param("/go_on")
     script = tmp_path / "pick_like.yaml"
     script.write_text(PICK)
     command = ["rosrun", "modular_framework_core", "run_task", str(script), f"_states_directory:={tmp_path}"]
-    process = subprocess.Popen(
-        command, env=ros_session.env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    return subprocess.Popen(
+        [*command, *arguments], env=ros_session.env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
+
+
+@pytest.fixture()
+def task(ros_session: RosSession, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    process = start_task(ros_session, tmp_path)
     yield process
     if process.poll() is None:
         process.kill()
         process.wait(10.0)
+
+
+def test_a_run_is_no_longer_shown_beside_the_next_run_of_the_same_node(ros_session, tmp_path) -> None:
+    process = start_task(ros_session, tmp_path, "_wait_for_start:=true")
+    try:
+        rospy.wait_for_service("/run_task/start", 60.0)
+        for _ in range(2):
+            viewer = Viewer()
+            start = rospy.ServiceProxy("/run_task/start", Trigger)
+            assert until(lambda start=start: start().success), "the run starts"
+            assert until(lambda viewer=viewer: viewer.active("/pick_like") == ["Select"])
+            for step in ("selected", "planned", "closed", "lifted"):
+                rospy.set_param(f"/go_on/{step}", True)
+            assert until(lambda: not [name for name, _ in rospy.get_published_topics() if "/run_task/smach" in name])
+            rospy.delete_param("/go_on")
+            viewer.close()
+    finally:
+        rospy.delete_param("/run_task/wait_for_start")  # outlives the node
+        process.send_signal(signal.SIGINT)
+        process.wait(20.0)
 
 
 def test_a_viewer_follows_the_active_states_of_a_nested_task_to_its_end(task) -> None:

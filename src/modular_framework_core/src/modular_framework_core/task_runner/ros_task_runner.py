@@ -46,7 +46,7 @@ from modular_framework_core.task_constructor import generator, loading, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, PlannerNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder
-from modular_framework_core.task_runner.ros_introspection import with_introspection
+from modular_framework_core.task_runner.ros_introspection import TaskIntrospection
 from modular_framework_core.task_runner.ros_state_text import StateText
 from modular_framework_core.task_runner.task_runner import (
     EXIT_NOT_RUN,
@@ -196,7 +196,8 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
     previous_handlers = {item: signal.signal(item, on_stop) for item in (signal.SIGINT, signal.SIGTERM)}
     reporter, started = TaskReporter(name), time.time()
     recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time)
-    run = TaskRun(name, with_introspection(name, factory), recorder)
+    introspection = TaskIntrospection(name, factory)
+    run = TaskRun(name, introspection.make_machine, recorder)
     stop = rospy.Service("~stop", Trigger, lambda request: _on_stop_request(stop_causes))
     try:
         with SimulatedTime().held(f"task '{name}'"):  # simulated time stands still while states compute
@@ -210,6 +211,7 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
     _write_record(started, result, recorder)
     reporter.on_end(result, frozen_nodes())
     time.sleep(PUBLISH_TIME_S)
+    introspection.stop()
     return result.exit_code
 
 
