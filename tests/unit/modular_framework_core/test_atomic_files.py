@@ -76,7 +76,7 @@ def test_a_state_machine_that_cannot_be_written_leaves_nothing_and_is_named(tmp_
 def test_a_record_that_cannot_be_written_leaves_nothing_and_is_named(tmp_path: Path) -> None:
     record = StateRecord("A" * 200, 0.0)
     with pytest.raises(OSError, match=r"free space, or name another folder: '.*/pick_.*json'"), full_disk():
-        write_record(tmp_path, 0.0, TaskResult("pick", "done", 0), (record,))
+        write_record(tmp_path, 0.0, TaskResult("pick", "done", 0), (record,), ())
     assert left_in(tmp_path) == []
 
 

@@ -40,6 +40,21 @@ def test_a_generated_machine_runs_the_states_in_the_order_of_the_task(world: Wor
     assert made.execute() == "done"
 
 
+def test_a_generated_module_knows_the_line_of_each_state_and_nested_machine(world: World) -> None:
+    text = (
+        HEADER + "  - A: {source: remember, v: 1, transitions: {success: M, fail: fail}}\n"
+        "  - M:\n      source: state_machine\n      transitions: {success: success, fail: fail}\n"
+        "      outcomes: [success, fail]\n      states:\n        - B: {source: remember, v: 2}\n"
+    )
+    script = world.write(text)
+    locations = loading.load_module(script).LOCATIONS
+    assert {path: location.rpartition(".yaml:")[2].partition(":")[0] for path, location in locations.items()} == {
+        "A": "5",
+        "M": "7",  # the machine, after its label
+        "M/B": "11",
+    }
+
+
 def test_a_failing_state_takes_the_other_way(world: World) -> None:
     assert machine(world, GOOD_TASK.replace("target: home", "target: nowhere")).execute() == "gave_up"
 

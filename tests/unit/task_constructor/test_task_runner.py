@@ -11,7 +11,7 @@ import pytest
 
 import smach
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_core.task_runner.record import StateRecord, TaskRecorder
+from modular_framework_core.task_runner.record import MachineRecord, StateRecord, TaskRecorder
 from modular_framework_core.task_runner.task_runner import TaskResult, TaskRun
 
 
@@ -141,6 +141,34 @@ def test_the_listener_hears_the_start_and_the_end_of_each_state() -> None:
 
     run(machine(A=(Try(), ENDS)), TaskRecorder(listen))
     assert heard == [("A", None, ("A",)), ("A", "success", ())]
+
+
+def test_a_record_has_the_userdata_that_a_state_read_and_wrote_and_its_line_in_the_task() -> None:
+    class Choose(FrameworkState):
+        def __init__(self) -> None:
+            super().__init__(input_keys=["given", "unset"], output_keys=["chosen"])
+
+        def execute(self, userdata: Any) -> str:
+            userdata.chosen = userdata.given * 2
+            return self.succeed()
+
+    made = machine(A=(Choose(), ENDS))
+    made.userdata.given = 1.5
+    recorder = TaskRecorder(locations={"A": "pick.yaml:7:5"})
+    run(made, recorder)
+    (record,) = recorder.records()
+    assert (record.inputs, record.outputs, record.location) == ({"given": "1.5"}, {"chosen": "3"}, "pick.yaml:7:5")
+    assert made.userdata.chosen == 3.0
+
+
+def test_a_record_has_the_structure_of_each_machine() -> None:
+    inner = machine(B=(Try(), ENDS))
+    recorder = TaskRecorder()
+    run(machine(A=(Try(), {"success": "Inner", "fail": "gave_up"}), Inner=(inner, {})), recorder)
+    root, nested = recorder.machines()
+    assert (root.path, root.children, root.initial, root.outcomes) == ("", ("A", "Inner"), ("A",), ("done", "gave_up"))
+    assert set(root.transitions) >= {("success", "A", "Inner"), ("fail", "A", "gave_up"), ("done", "Inner", "done")}
+    assert nested == MachineRecord("Inner", ("B",), ("B",), nested.transitions, ("done", "gave_up"))
 
 
 def test_times_are_those_of_the_clock() -> None:

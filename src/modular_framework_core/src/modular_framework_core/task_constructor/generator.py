@@ -31,6 +31,7 @@ import smach
 _FOOTER = '''\
 TASK_NAME = {name}
 NODE_NAME = {node_name}
+LOCATIONS = {locations}
 
 
 def create_state_machine():
@@ -43,7 +44,7 @@ if __name__ == "__main__":
 
     from modular_framework_core.task_runner.ros_task_runner import run_as_node
 
-    sys.exit(run_as_node(NODE_NAME, TASK_NAME, create_state_machine))
+    sys.exit(run_as_node(NODE_NAME, TASK_NAME, create_state_machine, LOCATIONS))
 '''
 
 
@@ -200,7 +201,13 @@ def _header(task: TaskSpec, digest: str) -> str:
 
 
 def _footer(task: TaskSpec) -> str:
-    return _FOOTER.format(name=literal(task.name), node_name=literal(task.node_name), root=task.root.type)
+    lines = [f"    {literal(path)}: {literal(str(location))},\n" for path, location in task.root.state_locations()]
+    return _FOOTER.format(
+        name=literal(task.name),
+        node_name=literal(task.node_name),
+        locations=f"{{\n{''.join(lines)}}}",
+        root=task.root.type,
+    )
 
 
 def _import_line(source: StateSource) -> str:

@@ -100,6 +100,13 @@ class MachineSpec:
             else:
                 yield child
 
+    def state_locations(self) -> Iterator[tuple[str, SourceLocation]]:
+        """Yields the path of each state and nested machine, relative to this machine, and its position in the task."""
+        for child in self.states:
+            yield child.label, child.location
+            if isinstance(child, MachineSpec):
+                yield from ((f"{child.label}/{path}", location) for path, location in child.state_locations())
+
 
 ChildSpec = Union[StateSpec, MachineSpec]  # noqa: UP007 - the class above refers to it by name
 

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Records the start, end, outcome and reason of every state execution of a task, for any smach state."""
+"""Records the start, end, outcome, reason and userdata of every state execution of a task, for any smach state."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import smach
+from modular_framework_core.task_runner.userdata_text import WatchedUserdata, userdata_texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,9 @@ class StateRecord:
         reason: Reason given by the state; "" without a reason.
         ros_started_s: Start time on the ROS clock [s]; None without a ROS clock.
         ros_ended_s: End time on the ROS clock [s]; None while running or without a ROS clock.
+        location: Position of the definition in the task, as "file:line:column"; "" if unknown.
+        inputs: Text of each input key of the userdata at the start.
+        outputs: Text of each userdata value that the state wrote.
     """
 
     path: str
@@ -35,6 +39,28 @@ class StateRecord:
     reason: str = ""
     ros_started_s: float | None = None
     ros_ended_s: float | None = None
+    location: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class MachineRecord:
+    """Structure of a state machine of a task.
+
+    Attributes:
+        path: Labels from the root to the machine, joined by "/"; "" for the root.
+        children: Labels of the states, in order.
+        initial: Labels of the initial states; a concurrence has several.
+        transitions: Outcome, label of the state, and next label or outcome of the machine.
+        outcomes: Outcomes of the machine.
+    """
+
+    path: str
+    children: tuple[str, ...]
+    initial: tuple[str, ...]
+    transitions: tuple[tuple[str, str, str], ...]
+    outcomes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +71,15 @@ class RunningState:
         path: Labels from the root to the state, joined by "/".
         elapsed_s: Time since the start of the state [s].
         feedback: Activity reported by the state; "" without a report.
+        location: Position of the definition in the task; "" if unknown.
+        inputs: Text of each input key of the userdata at the start.
     """
 
     path: str
     elapsed_s: float
     feedback: str
+    location: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +119,8 @@ class TaskRecorder:
         listener: Listener | None = None,
         clock: Callable[[], float] = time.monotonic,
         ros_clock: Callable[[], float | None] = lambda: None,
+        *,
+        locations: Mapping[str, str] | None = None,
     ) -> None:
         """Stores the start time of the task.
 
@@ -96,14 +128,17 @@ class TaskRecorder:
             listener: Function called at each start and end of a leaf state.
             clock: Function that returns the time [s].
             ros_clock: Function that returns the ROS time [s].
+            locations: Position of each state's definition in the task, keyed by path.
         """
         self._listener = listener
         self._clock = clock
         self._ros_clock = ros_clock
+        self._locations = dict(locations or {})
         self._start_s = clock()
         self._lock = threading.Lock()
         self._notify_lock = threading.Lock()
         self._records: list[StateRecord] = []
+        self._machines: list[MachineRecord] = []
         self._active: dict[int, tuple[str, smach.State]] = {}
 
     def elapsed_s(self) -> float:
@@ -112,11 +147,25 @@ class TaskRecorder:
 
     def attach(self, machine: smach.Container) -> None:
         """Starts recording all states of a machine, including nested machines."""
+        self._add_machine(machine, "")
         for label, child in machine.get_children().items():
             self._attach_state(child, label)
 
+    def _add_machine(self, machine: smach.Container, path: str) -> None:
+        edges = machine.get_internal_edges()
+        record = MachineRecord(
+            path=path,
+            children=tuple(map(str, machine.get_children())),
+            initial=tuple(map(str, machine.get_initial_states())),
+            transitions=tuple((str(outcome), str(label), str(target)) for outcome, label, target in edges),
+            outcomes=tuple(map(str, machine.get_registered_outcomes())),
+        )
+        with self._lock:
+            self._machines.append(record)
+
     def _attach_state(self, state: smach.State, path: str) -> None:
         if isinstance(state, smach.Container):
+            self._add_machine(state, path)
             for label, child in state.get_children().items():
                 self._attach_state(child, f"{path}/{label}")
             return
@@ -126,29 +175,36 @@ class TaskRecorder:
             for attribute in ("reason", "feedback"):
                 if hasattr(state, attribute):
                     setattr(state, attribute, "")
-            index = self._begin(path, state)
+            index = self._begin(path, state, userdata_texts(userdata, state.get_registered_input_keys()))
+            watched = WatchedUserdata(userdata)
             try:
-                outcome = execute(userdata)
+                outcome = execute(watched)
             except BaseException as error:
                 self._end(index, None, True, f"raised {type(error).__name__}: {error}")
                 raise
             reason = str(getattr(state, "reason", "") or "")
             outcomes = state.get_registered_outcomes()
             negative = len(outcomes) > 1 and outcome == outcomes[-1]
-            self._end(index, outcome, negative or bool(reason), reason)
+            self._end(index, outcome, negative or bool(reason), reason, watched.written_texts())
             return outcome
 
         state.execute = execute_and_record  # type: ignore[method-assign]
 
-    def _begin(self, path: str, state: smach.State) -> int:
+    def _begin(self, path: str, state: smach.State, inputs: Mapping[str, str]) -> int:
+        location = self._locations.get(path, "")
         with self._lock:
             index = len(self._records)
-            self._records.append(StateRecord(path, self.elapsed_s(), ros_started_s=self._ros_clock()))
+            record = StateRecord(
+                path, self.elapsed_s(), ros_started_s=self._ros_clock(), location=location, inputs=inputs
+            )
+            self._records.append(record)
             self._active[index] = path, state
         self._notify(index)
         return index
 
-    def _end(self, index: int, outcome: str | None, failed: bool, reason: str) -> None:
+    def _end(
+        self, index: int, outcome: str | None, failed: bool, reason: str, outputs: Mapping[str, str] | None = None
+    ) -> None:
         with self._lock:
             self._active.pop(index, None)
             if failed and not reason:
@@ -160,6 +216,7 @@ class TaskRecorder:
                 failed=failed,
                 reason=reason,
                 ros_ended_s=self._ros_clock(),
+                outputs=outputs or {},
             )
         self._notify(index)
 
@@ -176,6 +233,11 @@ class TaskRecorder:
         with self._lock:
             return tuple(self._records)
 
+    def machines(self) -> tuple[MachineRecord, ...]:
+        """Returns the structures of all machines, the root first."""
+        with self._lock:
+            return tuple(self._machines)
+
     def active(self) -> tuple[str, ...]:
         """Returns the paths of the running states."""
         with self._lock:
@@ -186,7 +248,13 @@ class TaskRecorder:
         now = self.elapsed_s()
         with self._lock:
             return tuple(
-                RunningState(path, now - self._records[index].started_s, str(getattr(state, "feedback", "")))
+                RunningState(
+                    path,
+                    now - self._records[index].started_s,
+                    str(getattr(state, "feedback", "")),
+                    self._records[index].location,
+                    self._records[index].inputs,
+                )
                 for index, (path, state) in self._active.items()
             )
 

@@ -30,7 +30,8 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,21 @@ class TaskNotRun(Exception):
     """The task cannot be run."""
 
 
+@dataclass(frozen=True, slots=True)
+class RunnableTask:
+    """A task that can be run.
+
+    Attributes:
+        name: Name of the task.
+        factory: Function that creates a new state machine.
+        locations: Position of each state's definition, keyed by path; empty if unknown.
+    """
+
+    name: str
+    factory: Callable[[], smach.Container]
+    locations: Mapping[str, str] = field(default_factory=dict)
+
+
 def launch_time() -> float:
     """Returns the launch time [s since 1970] from roslaunch's run ID, or the start time of this process."""
     try:
@@ -127,6 +143,9 @@ class TaskReporter:
                 "state_elapsed_s": round((record.ended_s or record.started_s) - record.started_s, 3),
                 "outcome": record.outcome,
                 "reason": record.reason,
+                "location": record.location,
+                "inputs": dict(record.inputs),
+                "outputs": dict(record.outputs),
             }
         )
 
@@ -143,6 +162,8 @@ class TaskReporter:
                 "elapsed_s": round(time.monotonic() - self._started, 3),
                 "state_elapsed_s": round(states[-1].elapsed_s, 3),
                 "feedback": {state.path: state.feedback for state in states if state.feedback},
+                "location": states[-1].location,
+                "inputs": dict(states[-1].inputs),
             }
         )
 
@@ -179,12 +200,11 @@ class TaskReporter:
             )
 
 
-def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Callable[[], None] = lambda: None) -> int:
+def run_machine(task: RunnableTask, on_signal: Callable[[], None] = lambda: None) -> int:
     """Runs a task until it ends or is stopped by SIGINT, SIGTERM or the shutdown of ROS; returns the exit code.
 
     Args:
-        name: Name of the task.
-        factory: Function that creates the state machine, called in the task's thread.
+        task: Task; its state machine is created in the thread of the run.
         on_signal: Function called on SIGINT or SIGTERM.
     """
     stop_causes: list[str] = []
@@ -194,13 +214,13 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
         on_signal()
 
     previous_handlers = {item: signal.signal(item, on_stop) for item in (signal.SIGINT, signal.SIGTERM)}
-    reporter, started = TaskReporter(name), time.time()
-    recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time)
-    introspection = TaskIntrospection(name, factory)
-    run = TaskRun(name, introspection.make_machine, recorder)
+    reporter, started = TaskReporter(task.name), time.time()
+    recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time, locations=task.locations)
+    introspection = TaskIntrospection(task.name, task.factory)
+    run = TaskRun(task.name, introspection.make_machine, recorder)
     stop = rospy.Service("~stop", Trigger, lambda request: _on_stop_request(stop_causes))
     try:
-        with SimulatedTime().held(f"task '{name}'"):  # simulated time stands still while states compute
+        with SimulatedTime().held(f"task '{task.name}'"):  # simulated time stands still while states compute
             run.start()
             _wait(run, stop_causes, lambda: reporter.on_running(recorder.running()))
     finally:
@@ -223,7 +243,7 @@ def _on_stop_request(stop_causes: list[str]) -> TriggerResponse:
 def _write_record(started: float, result: TaskResult, recorder: TaskRecorder) -> None:
     try:
         folder = Path(_parameter("~record_directory") or default_folders.framework_home() / "task_records")
-        path = write_record(folder, started, result, recorder.records())
+        path = write_record(folder, started, result, recorder.records(), recorder.machines())
     except (OSError, TaskNotRun) as error:
         rospy.logwarn(f"the record of the run is not written: {error}; set ~record_directory to a writable folder")
         return
@@ -259,30 +279,36 @@ def _finish(exit_code: int) -> int:
     return exit_code
 
 
-def run_as_node(node_name: str, task_name: str, factory: Callable[[], smach.Container]) -> int:
+def run_as_node(
+    node_name: str,
+    task_name: str,
+    factory: Callable[[], smach.Container],
+    locations: Mapping[str, str] | None = None,
+) -> int:
     """Runs a state machine as a ROS node and returns the exit code. Generated modules call this function.
 
     Args:
         node_name: Name of the ROS node.
         task_name: Name of the task.
         factory: Function that creates the state machine.
+        locations: Position of each state's definition in the task, keyed by path.
     """
     _start_node(node_name)
-    return _finish(run_machine(task_name, factory))
+    return _finish(run_machine(RunnableTask(task_name, factory, locations or {})))
 
 
 def main() -> int:
     """Body of the node ``run_task``."""
     _start_node("run_task")
     try:
-        name, factory = prepare(rospy.myargv()[1:])
+        task = prepare(rospy.myargv()[1:])
         wait_for_start = _parameter("~wait_for_start")
     except TaskNotRun as error:
         rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
     if wait_for_start:
-        return _finish(StartedRuns(name, factory).serve())
-    return _finish(run_machine(name, factory))
+        return _finish(StartedRuns(task).serve())
+    return _finish(run_machine(task))
 
 
 def _parameter(name: str) -> Any:
@@ -300,14 +326,9 @@ def _parameter(name: str) -> Any:
 class StartedRuns:
     """Runs a task on request, until SIGINT, SIGTERM or the shutdown of ROS."""
 
-    def __init__(self, name: str, factory: Callable[[], smach.Container]) -> None:
-        """Stores the task.
-
-        Args:
-            name: Name of the task.
-            factory: Function that creates a new state machine for each run.
-        """
-        self._name, self._factory = name, factory
+    def __init__(self, task: RunnableTask) -> None:
+        """Stores the task."""
+        self._task = task
         self._requested, self._running, self._ended = threading.Event(), threading.Lock(), threading.Event()
 
     def serve(self) -> int:
@@ -321,19 +342,19 @@ class StartedRuns:
                 continue
             with self._running:
                 self._requested.clear()
-                exit_code = run_machine(self._name, self._factory, self._ended.set)
+                exit_code = run_machine(self._task, self._ended.set)
         service.shutdown("the node ends")
         return exit_code
 
     def _start(self) -> TriggerResponse:
         if self._running.locked() or self._requested.is_set():
-            return TriggerResponse(success=False, message=f"task '{self._name}' runs already; wait for its end")
+            return TriggerResponse(success=False, message=f"task '{self._task.name}' runs already; wait for its end")
         self._requested.set()
-        return TriggerResponse(success=True, message=f"task '{self._name}' starts")
+        return TriggerResponse(success=True, message=f"task '{self._task.name}' starts")
 
 
-def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
-    """Returns the name of the task to run and the function that creates its state machine.
+def prepare(arguments: list[str]) -> RunnableTask:
+    """Returns the task to run.
 
     Args:
         arguments: Command-line arguments. Without arguments, the parameters select the task.
@@ -355,7 +376,7 @@ def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
     return _prepare_task(default_folders.task_script(path))
 
 
-def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
+def _prepare_machine(path: Path) -> RunnableTask:
     if not path.is_absolute() and not path.is_file():
         path = generator.default_output_directory() / path
     try:
@@ -363,10 +384,11 @@ def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
         factory = loading.machine_factory(module)
     except loading.LoadingError as error:
         raise TaskNotRun(str(error)) from error
-    return str(getattr(module, "TASK_NAME", path.stem)), factory
+    locations = getattr(module, "LOCATIONS", {})
+    return RunnableTask(str(getattr(module, "TASK_NAME", path.stem)), factory, locations)
 
 
-def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
+def _prepare_task(script: Path) -> RunnableTask:
     try:
         states = default_folders.states_folders(_directories("states_directory"))
         templates = default_folders.templates_folders(_directories("templates_directory"))

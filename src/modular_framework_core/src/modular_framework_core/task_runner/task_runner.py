@@ -14,7 +14,7 @@ from pathlib import Path
 
 import smach
 from modular_framework_core.files.atomic_files import write_atomically
-from modular_framework_core.task_runner.record import FailureSummary, StateRecord, TaskRecorder
+from modular_framework_core.task_runner.record import FailureSummary, MachineRecord, StateRecord, TaskRecorder
 from modular_framework_ros.stop_requests import stoppable
 
 EXIT_SUCCEEDED = 0
@@ -163,17 +163,24 @@ def _location_prefix(error: Exception) -> str:
     return f"{locations[-1]}: " if locations else ""
 
 
-def write_record(folder: Path, begun: float, result: TaskResult, records: tuple[StateRecord, ...]) -> Path:
+def write_record(
+    folder: Path,
+    begun: float,
+    result: TaskResult,
+    records: tuple[StateRecord, ...],
+    machines: tuple[MachineRecord, ...],
+) -> Path:
     """Writes the record of one run as JSON, for tools that compare runs.
 
-    The keys are ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``, a list of
-    ``StateRecord`` fields.
+    The keys are ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error``, ``states``, a list of
+    ``StateRecord`` fields, and ``machines``, a list of ``MachineRecord`` fields.
 
     Args:
         folder: Output folder; created if missing.
         begun: Start time of the task [s since 1970].
         result: Result of the task.
         records: Records of the state executions.
+        machines: Structures of the task's state machines.
 
     Returns:
         The path of the file, ``<task>_<date>_<time>_<process>.json``.
@@ -188,6 +195,7 @@ def write_record(folder: Path, begun: float, result: TaskResult, records: tuple[
         "succeeded": result.succeeded,
         "error": result.error,
         "states": [asdict(record) for record in records],
+        "machines": [asdict(machine) for machine in machines],
     }
     write_atomically(path, json.dumps(content, indent=1))
     return path
