@@ -78,6 +78,7 @@ def test_poses_are_those_of_the_simulation_and_a_model_at_rest_has_one_row(tmp_p
     )
     assert written["recording_fault"] == "" and written["final"]["cube"][2] == pytest.approx(1.5)
     recording = json.loads((tmp_path / "recording.json").read_text())
+    assert recording["origin_s"] == 0.0
     assert recording["spawned"] == {"cube": "cube"} and recording["scales"] == {"cube": 0.8}
     objects = recording["objects"]
     assert objects["cube"]["time_s"] == pytest.approx([0.02 * number for number in range(20)])

@@ -27,6 +27,7 @@ KINDS = {
         "recording.json",
         "world.json",
         "parameters.json",
+        "episode.json",
         "task_records",
     ),
 }

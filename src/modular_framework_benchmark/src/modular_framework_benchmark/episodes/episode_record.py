@@ -17,6 +17,8 @@ from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.metrics.failure_classes import failure_class
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
+    EPISODE,
+    TASK_RECORDS,
     objects_of,
     read_descriptions,
     read_joints,
@@ -33,8 +35,8 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, from_json
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
+from modular_framework_benchmark.results.json_records import record_to_json
 
-TASK_RECORDS = "task_records"
 EPISODE_PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, with the moment that ends each."""
 SNAPSHOT_KEYS = ("shake_fault", "video_fault", "recording_fault", "world_digest")
@@ -140,6 +142,11 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         | ({FAILURE_CLASS: failure.value} if failure is not None else {}),
         folder=str(end.folder),
     )
+
+
+def write_episode(folder: Path, record: EpisodeRecord) -> None:
+    """Writes the record of an episode beside its files, so that the folder is complete without the database."""
+    (folder / EPISODE).write_text(record_to_json(record))
 
 
 def _with_known_names(end: EpisodeEnd, stage: SimulatedStage | None) -> EpisodeEnd:

@@ -94,6 +94,7 @@ def write_recording(
     trajectory.to_parquet(folder / TRAJECTORY)
     tracking.to_parquet(folder / TRACKING)
     content = {
+        "origin_s": origin_s,
         "objects": {name: rows.to_dict("list") for name, rows in poses.items()},
         "spawned": {placed.name: placed.model for placed in spawned},
         "scales": {placed.name: placed.scale for placed in spawned if placed.scale is not None},

@@ -11,14 +11,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.episodes.episode_record import TASK_RECORDS, EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record, write_episode
 from modular_framework_benchmark.episodes.episode_video import make_video_apart
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.episodes.stack import Stack, StackError, StackLaunch
 from modular_framework_benchmark.experiments.success_criteria import NO_CRITERIA
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
-from modular_framework_benchmark.metrics.recording_files import read_stage
+from modular_framework_benchmark.metrics.recording_files import TASK_RECORDS, read_stage
 from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_benchmark.predicates.predicate import Stage
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
@@ -75,7 +75,9 @@ class TaskEpisodeRunner:
         end = replace(end, stop_s=time.monotonic() - stop)
         if settings.record.video and "zero" in end.answer:
             end = replace(end, answer={**end.answer, "video_fault": make_video_apart(folder)})
-        return make_record(end)
+        record = make_record(end)
+        write_episode(folder, record)
+        return record
 
     def close(self) -> None:
         """Stops the reusable stack and all its processes; repeated calls are allowed."""

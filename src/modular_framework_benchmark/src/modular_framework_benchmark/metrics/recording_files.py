@@ -6,8 +6,10 @@
 | `trajectory.parquet` | samples: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
 | `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
 | `parameters.json` | all parameters of the parameter server |
-| `recording.json` | objects, grasps and reports of the components |
+| `recording.json` | `origin_s`: ROS time at the start of the recording; objects, grasps and reports of the components |
 | `world.json` | record of the world by the simulation, as `read_world` reads it |
+| `episode.json` | record of the episode, as in the database |
+| `task_records/` | record of the task by `run_task`: states with their userdata, and the structure of the machines |
 
 `time_s` is simulated time since the start of the recording.
 """
@@ -36,6 +38,7 @@ from modular_framework_ros.reported_figures import declared_figure
 
 TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
 PARAMETERS, WORLD_RECORD = "parameters.json", "world.json"
+EPISODE, TASK_RECORDS = "episode.json", "task_records"
 
 
 def read_recording(folder: Path) -> dict[str, Any]:
