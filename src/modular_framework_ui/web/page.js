@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Shows the state of a task from the changes that the server sends; page_protocol.py defines the messages.
 
+import { Plots } from "./plots.js";
+
 const RETRY_MS = 1000;
 const AXIS_STEPS_S = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
+const PLOT_PERIOD_MS = 200;
+const PLAY_PERIOD_MS = 100;
 const MAX_ITEMS = 300; // per list
+const ROUNDING_S = 1e-4;
 const MARGIN_S = 0.5; // log lines within this time of a selected run belong to the run
 
 // A frame from another host name has its own browser process, so the view of the world does not slow down the page.
@@ -12,9 +17,10 @@ const OTHER_LOOPBACK_NAMES = { "127.0.0.1": "localhost", localhost: "127.0.0.1" 
 const element = (id) => document.getElementById(id);
 
 /** State received from the server; times are in seconds of the server's clock. */
-const state = { task: null, runs: new Map(), log: new Map(), drawing: "", viewer: "", offset_s: 0, selected: null };
+const state = { task: null, runs: new Map(), log: new Map(), samples: new Map(), joints: [], drawing: "", viewer: "", record: { title: "", omissions: [], marks: [] }, offset_s: 0, selected: null, view_s: null };
 const rows = new Map(); // rows of the time line, keyed by state path
 const bars = new Map(); // bars of the time line, keyed by run index
+const plots = new Plots(element("plots"), showCursor);
 
 function make(kind, className, text) {
   const made = document.createElement(kind);
@@ -26,6 +32,16 @@ function make(kind, className, text) {
 const now_s = () => performance.now() / 1000 + state.offset_s;
 const seconds = (value) => `${value.toFixed(1)} s`;
 const sinceStart = (time_s) => time_s - state.task.start_s;
+/** Returns the shown time, in seconds of the server's clock; infinite for the latest state. */
+const viewed_s = () => (state.view_s === null ? Infinity : state.task.start_s + state.view_s + ROUNDING_S);
+
+/** Returns the runs as they were at the shown time. */
+function viewedRuns() {
+  const started = [...state.runs.values()].filter((run) => run.start_s <= viewed_s());
+  return started.map((run) => (run.end_s === null || run.end_s <= viewed_s() ? run
+    : { ...run, end_s: null, outcome: "", reason: "", has_failed: false, outputs: {} }));
+}
+
 const shortName = (path) => path.split("/").slice(2).join("/");
 
 function kindOf(run) {
@@ -49,12 +65,17 @@ function receive(message) {
   const isNewTask = state.task === null || state.task.number !== message.task.number;
   if (isNewTask) {
     state.runs.clear();
+    state.samples.clear();
+    state.view_s = null;
+    state.record = message.record;
     select(null);
     clearTimeLine();
   }
   state.task = message.task;
   merge(state.runs, message.runs, message.oldest_run);
   merge(state.log, message.log, message.oldest_line);
+  merge(state.samples, message.samples, message.oldest_sample);
+  state.joints = message.joints;
   if (message.drawing !== null) showDrawing(message.drawing);
   if (message.viewer !== state.viewer) showWorld(message.viewer);
   showTask();
@@ -62,13 +83,18 @@ function receive(message) {
   if (isNewTask || message.runs.length > 0) {
     showTimeLine();
     showRuns();
+    showState();
   }
   if (isNewTask || message.log.length > 0) showLog();
+  if (isNewTask || message.samples.length > 0) arePlotsOld = true;
 }
 
 function merge(entries, changed, oldest) {
   for (const entry of changed) entries.set(entry.index, entry);
-  for (const index of entries.keys()) if (index < oldest) entries.delete(index);
+  for (const index of entries.keys()) { // ascending
+    if (index >= oldest) break;
+    entries.delete(index);
+  }
 }
 
 function connect() {
@@ -99,7 +125,7 @@ const PHASES = {
 function showTask() {
   const { task } = state;
   const name = task.root.replace(/^\//, "") || "No task";
-  element("name").textContent = name;
+  element("name").textContent = state.record.title === "" ? name : `${name}, ${state.record.title}`;
   document.title = `${name}: ${task.phase}`;
   element("phase").textContent = PHASES[task.phase];
   element("phase").className = `badge ${task.phase}`;
@@ -112,9 +138,10 @@ function setText(id, text) { // setting the same text makes a screen reader repe
 }
 
 function sentence(task) {
+  if (viewed_s() < (task.end_s ?? Infinity)) return `At ${seconds(state.view_s)}: ${runningSentence(task)}`;
   const ending = task.outcome === "" ? "" : ` with outcome '${task.outcome}'`;
   switch (task.phase) {
-    case "waiting": return "Waiting for a task. The page follows the next task by itself.";
+    case "waiting": return "Waiting for a task. The page shows the next task automatically.";
     case "running": return runningSentence(task);
     case "succeeded": return `The task succeeded${ending}.`;
     case "failed": return `The task failed${ending}. ${task.reason}`;
@@ -124,9 +151,9 @@ function sentence(task) {
 }
 
 function runningSentence(task) {
-  const running = [...state.runs.values()].filter((run) => run.end_s === null && !run.is_machine);
+  const running = viewedRuns().filter((run) => run.end_s === null && !run.is_machine);
   const names = running.map((run) => {
-    const activity = task.feedback[run.path];
+    const activity = state.view_s === null ? task.feedback[run.path] : "";
     return activity ? `${shortName(run.path)} (${activity})` : shortName(run.path);
   });
   return names.length === 0 ? "Between two states." : `Running: ${names.join(", ")}.`;
@@ -165,7 +192,7 @@ function selectLast(path) {
 function colourGraph(follows) {
   const last = new Map();
   const taken = new Set();
-  for (const run of state.runs.values()) {
+  for (const run of viewedRuns()) {
     last.set(run.path, run);
     if (run.outcome !== "") taken.add(`${run.path} ${run.outcome}`);
   }
@@ -203,6 +230,7 @@ function showWorld(address) {
   element("world-panel").hidden = address === "";
   const isShown = address !== "" && element("world-switch").getAttribute("aria-pressed") === "true";
   element("panels").classList.toggle("without-world", address === "");
+  element("panels").classList.toggle("world-off", address !== "" && !isShown);
   if (!isShown) {
     element("world").replaceChildren();
     return;
@@ -223,6 +251,20 @@ function clearTimeLine() {
   element("time").replaceChildren(make("div", "row axis"));
   element("time").firstChild.append(make("span", "", "Time"), make("div", "bars"));
   delete element("time").dataset.step;
+  element("time").classList.remove("with-view");
+  element("time").append(...state.record.marks.map(markRow));
+}
+
+/** Returns the row of a milestone. */
+function markRow(mark) {
+  const row = make("div", "row");
+  const isMissed = mark.time_s === null;
+  row.append(make("span", "", `◆ ${mark.name}`), make("div", "bars"));
+  row.firstChild.title = isMissed ? `milestone ${mark.name}: missed` : `milestone ${mark.name}: ${seconds(mark.time_s)}`;
+  const shown = make("span", isMissed ? "mark missed" : "mark", isMissed ? "missed" : "◆");
+  shown.style.setProperty("--start", mark.time_s ?? 0);
+  row.lastChild.append(shown);
+  return row;
 }
 
 function rowOf(run) {
@@ -264,7 +306,7 @@ function showTimeLine() {
 
 function moveTimeLine() {
   if (state.task === null || state.task.phase === "waiting") return;
-  const elapsed_s = Math.max(1, sinceStart(state.task.end_s ?? now_s()));
+  const elapsed_s = Math.max(1, sinceStart(state.task.end_s ?? now_s()), ...state.record.marks.map((mark) => mark.time_s ?? 0));
   for (const [index, bar] of bars) {
     if (state.runs.get(index)?.end_s === null) bar.style.setProperty("--end", elapsed_s);
   }
@@ -272,6 +314,8 @@ function moveTimeLine() {
   const total_s = Math.ceil(elapsed_s / step_s) * step_s;
   const time = element("time");
   time.style.setProperty("--total", total_s);
+  alignPlots(total_s);
+  showMoment(total_s);
   if (time.dataset.step === `${step_s} ${total_s}`) return;
   time.dataset.step = `${step_s} ${total_s}`;
   const marks = [];
@@ -283,9 +327,180 @@ function moveTimeLine() {
   time.firstChild.lastChild.replaceChildren(...marks);
 }
 
+// ---- plots ---------------------------------------------------------------------------------------------------------
+let arePlotsOld = false;
+
+/** Gives the plots the time axis of the time line. */
+function alignPlots(total_s) {
+  const outer = element("scrub").getBoundingClientRect();
+  const inner = element("time").querySelector(".bars").getBoundingClientRect();
+  const right = Math.round(outer.right - inner.right);
+  element("scrub").lastElementChild.style.marginRight = `${right}px`;
+  plots.setAxis(total_s, Math.round(inner.left - outer.left), right);
+}
+
+function showPlots() {
+  if (!arePlotsOld || state.task === null) return;
+  arePlotsOld = false;
+  const samples = [...state.samples.values()].map((sample) => ({ ...sample, time_s: sinceStart(sample.time_s) }));
+  plots.setSamples(state.joints, samples);
+}
+
+function showQuantities() {
+  const pressed = element("quantities").querySelectorAll('[aria-pressed="true"]');
+  plots.show([...pressed].map((button) => button.value));
+}
+
+/** Shows a time [s since the start of the task] in the time line; null hides the cursor. */
+function showCursor(time_s) {
+  element("time").classList.toggle("with-cursor", time_s !== null);
+  element("time").style.setProperty("--cursor", time_s ?? 0);
+  const shown_s = time_s ?? state.view_s;
+  element("time").querySelector(".axis span").textContent = shown_s === null ? "Time" : `Time ${shown_s.toFixed(2)} s`;
+}
+
+/** Returns the time at a position of the mouse in the time line [s since the start of the task]; null beside it. */
+function timeAt(event) {
+  const inner = element("time").querySelector(".bars").getBoundingClientRect();
+  const fraction = (event.clientX - inner.left) / inner.width;
+  return fraction < 0 || fraction > 1 ? null : fraction * Number(element("time").style.getPropertyValue("--total"));
+}
+
+for (const button of element("quantities").children) {
+  button.addEventListener("click", () => {
+    button.setAttribute("aria-pressed", button.getAttribute("aria-pressed") !== "true");
+    showQuantities();
+  });
+}
+element("time").addEventListener("mousemove", (event) => {
+  plots.setCursor(timeAt(event));
+  showCursor(timeAt(event));
+});
+element("time").addEventListener("mouseleave", () => {
+  plots.setCursor(state.view_s);
+  showCursor(null);
+});
+new ResizeObserver(() => plots.build()).observe(element("plots"));
+
+// ---- shown time ----------------------------------------------------------------------------------------------------
+let player = null;
+
+/** Shows the task at a time [s since its start]; null shows the latest state. */
+function view(view_s) {
+  state.view_s = view_s;
+  element("time").classList.toggle("with-view", view_s !== null);
+  element("time").style.setProperty("--view", view_s ?? 0);
+  plots.setCursor(view_s);
+  showCursor(null);
+  moveTimeLine();
+  showTask();
+  colourGraph(true);
+  showRuns();
+  showState();
+  showLog();
+}
+
+function end_s() {
+  return sinceStart(state.task.end_s ?? now_s());
+}
+
+/** Shows the shown time on the slider, whose range is the time axis. */
+function showMoment(total_s) {
+  const slider = element("moment");
+  slider.max = total_s;
+  slider.value = state.view_s ?? end_s();
+  slider.setAttribute("aria-valuetext", state.view_s === null ? "latest" : seconds(state.view_s));
+  element("latest").disabled = state.view_s === null;
+}
+
+function stopPlaying() {
+  clearInterval(player);
+  player = null;
+  element("play").textContent = "Play";
+}
+
+/** Advances the shown time with the clock, from the start if the latest state is shown. */
+function togglePlaying() {
+  if (player !== null) { stopPlaying(); return; }
+  if (state.task === null || state.task.phase === "waiting") return;
+  select(null);
+  const start_s = (state.view_s ?? 0) - performance.now() / 1000;
+  element("play").textContent = "Pause";
+  player = setInterval(() => {
+    const next_s = start_s + performance.now() / 1000;
+    if (next_s >= end_s()) stopPlaying();
+    view(Math.min(next_s, end_s()));
+  }, PLAY_PERIOD_MS);
+}
+
+/** Shows the first failure of a state after the shown time, or the first failure of the task. */
+function showNextFailure() {
+  stopPlaying();
+  const failed = [...state.runs.values()].filter((run) => run.has_failed && !run.is_machine).sort((first, second) => first.end_s - second.end_s);
+  const next = failed.find((run) => state.view_s !== null && run.end_s > viewed_s()) ?? failed[0];
+  if (next === undefined) return;
+  select(next.index);
+  view(sinceStart(next.end_s));
+}
+
+element("moment").addEventListener("input", () => {
+  stopPlaying();
+  if (state.task === null || state.task.phase === "waiting") return;
+  const chosen_s = Number(element("moment").value); // before the selection is redrawn, which sets the slider
+  select(null);
+  view(Math.min(chosen_s, end_s()));
+});
+element("play").addEventListener("click", togglePlaying);
+element("failure").addEventListener("click", showNextFailure);
+element("latest").addEventListener("click", () => { stopPlaying(); view(null); });
+
+// ---- state ---------------------------------------------------------------------------------------------------------
+/** Returns the selected run, or else the latest running state, or else the latest ended state. */
+function shownRun() {
+  const runs = viewedRuns().filter((run) => !run.is_machine).reverse();
+  return state.runs.get(state.selected) ?? runs.find((run) => run.end_s === null) ?? runs[0];
+}
+
+function showState() {
+  const run = shownRun();
+  if (run === undefined) {
+    element("state").replaceChildren(make("p", "empty", "No state has started."));
+    return;
+  }
+  const heading = make("p", "");
+  heading.append(make("b", "", shortName(run.path)));
+  if (run.location !== "") {
+    const location = make("span", "location", shortLocation(run.location));
+    location.title = run.location;
+    heading.append(location);
+  }
+  element("state").replaceChildren(heading, userdataTable(run));
+}
+
+/** Returns the file name and the line of a location "folder/file:line:column". */
+function shortLocation(location) {
+  const [, file, line] = location.match(/([^/]*):(\d+):\d+$/) ?? [null, location, ""];
+  return line === "" ? file : `${file}, line ${line}`;
+}
+
+function userdataTable(run) {
+  const keys = [...new Set([...Object.keys(run.inputs), ...Object.keys(run.outputs)])];
+  if (keys.length === 0) return make("p", "empty", "No userdata.");
+  const table = make("table");
+  table.append(userdataRow(["Userdata", "at the start", "written"], "th"));
+  for (const key of keys) table.append(userdataRow([key, run.inputs[key] ?? "", run.outputs[key] ?? ""], "td"));
+  return table;
+}
+
+function userdataRow(texts, kind) {
+  const row = make("tr");
+  row.append(make("th", "", texts[0]), ...texts.slice(1).map((text) => make(kind, "", text)));
+  return row;
+}
+
 // ---- lists ---------------------------------------------------------------------------------------------------------
 function showRuns() {
-  const ended = [...state.runs.values()].filter((run) => run.end_s !== null);
+  const ended = viewedRuns().filter((run) => run.end_s !== null);
   ended.sort((first, second) => second.end_s - first.end_s || second.index - first.index);
   const items = ended.slice(0, MAX_ITEMS).map((run) => {
     const item = make("li", `${kindOf(run)}${run.is_machine ? " machine" : ""}${run.index === state.selected ? " selected" : ""}`);
@@ -300,7 +515,7 @@ function showRuns() {
 
 function showLog() {
   const run = state.runs.get(state.selected);
-  const lines = [...state.log.values()].filter(
+  const lines = [...state.log.values()].filter((line) => line.time_s <= viewed_s()).filter(
     (line) => run === undefined || (line.time_s >= run.start_s - MARGIN_S && line.time_s <= (run.end_s ?? Infinity) + MARGIN_S),
   );
   const items = lines.reverse().slice(0, MAX_ITEMS).map((line) => {
@@ -310,6 +525,8 @@ function showLog() {
     item.append(make("span", "level", line.level), " ", make("b", "", line.node), ` ${line.text}`);
     return item;
   });
+  const { omissions } = state.record;
+  if (omissions.length > 0) items.unshift(make("li", "empty", `Not in the record: ${omissions.join(", ")}.`));
   replaceItems("log", items, run === undefined ? "No warning and no error." : "No warning and no error at this time.");
 }
 
@@ -328,6 +545,7 @@ function select(index) {
   colourGraph(false);
   showTimeLine();
   showRuns();
+  showState();
   showLog();
 }
 
@@ -346,7 +564,9 @@ element("world-switch").addEventListener("click", () => {
 
 clearTimeLine();
 showWorld("");
+showQuantities();
 connect();
+setInterval(showPlots, PLOT_PERIOD_MS);
 setInterval(() => {
   if (state.task !== null && state.task.phase === "running") { showElapsed(); moveTimeLine(); }
 }, 100);

@@ -18,6 +18,7 @@ from reported_experiment import MILESTONES, TEXT, ReportedExperiment
 
 from modular_framework_benchmark.commands.report_command import main
 from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.reports.failure_groups import Link, episode_links
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode
 from modular_framework_benchmark.reports.time_figures import timelines_figure
 from modular_framework_benchmark.results.database import open_database
@@ -131,6 +132,15 @@ def test_each_failure_is_linked_to_its_files_relative_to_the_page(page: Page) ->
     assert {link.text_content().split()[0] for link in links} == {"folder", "log", "video"}
     for link in links:
         assert (page.path.parent / urllib.parse.unquote(link.get("href"))).exists()
+
+
+def test_an_episode_with_a_record_of_its_task_has_the_command_that_replays_it(tmp_path: Path) -> None:
+    for folder in ("episodes/1 a/task_records", "episodes/2"):
+        (tmp_path / folder).mkdir(parents=True)
+    links = episode_links("episodes/1 a", tmp_path, tmp_path / "report")
+    folder = tmp_path.resolve() / "episodes" / "1 a"
+    assert links[-1] == Link("replay", command=f"rosrun modular_framework_ui page --replay '{folder}'")
+    assert [link.text for link in episode_links("episodes/2", tmp_path, tmp_path / "report")] == ["folder"]
 
 
 def test_the_episodes_of_the_timelines_are_linked_to_their_files_successes_too(page: Page) -> None:

@@ -54,7 +54,8 @@ def message(browser: ClientConnection) -> dict[str, Any]:
 
 
 def test_the_page_and_its_files_are_served_with_a_policy_that_forbids_other_code(served: Served) -> None:
-    for name, kind in (("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css")):
+    script = "text/javascript"
+    for name, kind in (("", "text/html"), ("page.js", script), ("plots.js", script), ("page.css", "text/css")):
         with urllib.request.urlopen(served.server.address + name, timeout=5.0) as answer:
             assert answer.headers["Content-Type"].startswith(kind)
             assert "script-src 'self'" in answer.headers["Content-Security-Policy"]

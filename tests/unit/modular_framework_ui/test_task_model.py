@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import pytest
 
 from modular_framework_core.task_constructor.machine_graph import MachineFrame, StateBox, Transition
+from modular_framework_ui.joint_history import Quantity
 from modular_framework_ui.messages import MachineStatus, MachineStructure, ReportError, read_report
 from modular_framework_ui.page_protocol import changes_text
-from modular_framework_ui.task_model import MAX_RUNS, TaskModel
+from modular_framework_ui.task_model import MAX_RUNS, MAX_SAMPLES, SAMPLE_PERIOD_S, TaskModel
 from modular_framework_ui.task_state import Phase, StateRun
 
 PICK = MachineStructure(
@@ -138,6 +140,32 @@ def test_reports_give_outcomes_reasons_and_the_times_of_the_task(model: TaskMode
     assert len(runs_of(model)) == 3
 
 
+def test_reports_give_the_line_and_the_userdata_of_a_state(model: TaskModel) -> None:
+    read = {"location": "pick.yaml:7:5", "inputs": {"pose": "(0.1, 0.2, 0.3)"}}
+    report(model, "start", 0.1, "Look", active=["Look"], **read)
+    report(model, "end", 0.2, "Look", outcome="found", outputs={"grasp": "grasp_3"}, **read)
+    run = last_run(model, "/pick/Look")
+    assert (run.location, run.inputs, run.outputs) == (read["location"], read["inputs"], {"grasp": "grasp_3"})
+
+
+def test_without_reports_a_state_has_the_userdata_of_its_machine_at_its_start(model: TaskModel) -> None:
+    for active, width in (("Look", "0.04"), ("Look", "0.05"), ("Hold", "0.06")):
+        model.note_status(MachineStatus(path="/pick", initial=(), active=(active,), userdata={"width": width}))
+    assert last_run(model, "/pick/Look").inputs == {"width": "0.04"}
+    assert last_run(model, "/pick/Hold").inputs == {"width": "0.06"}
+
+
+def test_a_machine_that_is_no_longer_published_does_not_end_the_next_run_of_its_task(model: TaskModel) -> None:
+    note_active(model, "/pick", "Look")
+    report(model, "start", 0.1, "Look", active=["Look"])
+    report(model, "task_end", 2.0, outcome="done", succeeded=True)
+    report(model, "start", 0.1, "Look", active=["Look"])
+    model.note_lost_machine("/pick")  # published by the first run
+    assert model.changes_since(0).task.phase is Phase.RUNNING
+    model.note_lost_reports("/pick")
+    assert model.changes_since(0).task.phase is Phase.LOST
+
+
 def test_a_machine_whose_end_is_seen_before_its_last_state_gets_its_outcome_later(model: TaskModel) -> None:
     for structure in (PICK, HOLD):
         model.note_structure(structure)
@@ -235,6 +263,39 @@ def test_the_oldest_runs_are_dropped_first(model: TaskModel) -> None:
     assert (len(changes.runs), changes.oldest_run, min(changes.runs)) == (MAX_RUNS, 10, 10)
 
 
+def test_the_joints_are_sampled_at_most_ten_times_a_second_while_a_task_runs(model: TaskModel, clock: Clock) -> None:
+    def move(position: float) -> None:
+        model.note_joints(["pan", "lift"], {Quantity.POSITION: [position, math.nan], Quantity.EFFORT: []})
+
+    move(0.0)
+    assert model.changes_since(0).samples == {}
+    note_active(model, "/pick", "Look")
+    for step in range(1, 6):
+        model.note_joints(["lift"], {Quantity.ERROR: [0.01 * step]})
+        move(0.1 * step)
+        clock.now_s += SAMPLE_PERIOD_S / 2
+    changes = model.changes_since(0)
+    assert changes.joints == ("pan", "lift")
+    assert [(sample.time_s, sample.values[0], sample.values[3]) for sample in changes.samples.values()] == [
+        (pytest.approx(100.0 + SAMPLE_PERIOD_S * number), values, (None, error))
+        for number, (values, error) in enumerate([((0.0, None), 0.01), ((0.2, None), 0.03), ((0.4, None), 0.05)])
+    ]
+    message = json.loads(changes_text(changes))["samples"][1]
+    assert (message["index"], message["position"], message["velocity"]) == (1, [0.2, None], [None, None])
+
+
+def test_a_page_gets_each_sample_once_and_the_oldest_are_dropped_first(model: TaskModel, clock: Clock) -> None:
+    note_active(model, "/pick", "Look")
+    seen = 0
+    for _ in range(MAX_SAMPLES + 5):
+        model.note_joints(["pan"], {Quantity.POSITION: [0.0]})
+        clock.now_s += 2 * SAMPLE_PERIOD_S
+        changes = model.changes_since(seen)
+        assert len(changes.samples) == 1
+        seen = changes.revision
+    assert (model.changes_since(0).oldest_sample, len(model.changes_since(0).samples)) == (5, MAX_SAMPLES)
+
+
 def test_the_frame_nests_machines_and_knows_a_concurrence_by_its_initial_states(model: TaskModel) -> None:
     for structure in (PICK, HOLD):
         model.note_structure(structure)
@@ -255,7 +316,7 @@ def test_the_message_to_the_page_is_json_with_indices(model: TaskModel) -> None:
     assert message["task"]["phase"] == "running"
     assert message["runs"] == [
         {"index": 0, "path": "/pick/Look", "start_s": 100.0, "end_s": None, "outcome": "", "reason": "",
-         "has_failed": False, "is_machine": False}
+         "has_failed": False, "is_machine": False, "location": "", "inputs": {}, "outputs": {}}
     ]  # fmt: skip
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,11 +40,13 @@ class MachineStatus:
         path: Path of the container.
         initial: Labels of the initial states; a concurrence has several initial states.
         active: Labels of the running states; empty if the container does not run.
+        userdata: Text of each userdata value; no part of a comparison.
     """
 
     path: str
     initial: tuple[str, ...]
     active: tuple[str, ...]
+    userdata: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +64,9 @@ class TaskReport:
         reason: Reason of a failure; "" without a failure.
         succeeded: Whether the task succeeded; False before the end of the task.
         feedback: Current activities, keyed by state path.
+        location: Position of the state's definition in the task, as "file:line:column"; "" if unknown.
+        inputs: Text of each userdata value that the state read at its start.
+        outputs: Text of each userdata value that the state wrote; empty before its end.
     """
 
     task: str
@@ -73,6 +79,9 @@ class TaskReport:
     reason: str = ""
     succeeded: bool = False
     feedback: dict[str, str] = field(default_factory=dict)
+    location: str = ""
+    inputs: dict[str, str] = field(default_factory=dict)
+    outputs: dict[str, str] = field(default_factory=dict)
 
     @property
     def root(self) -> str:
@@ -118,13 +127,20 @@ def read_report(text: str) -> TaskReport:
             outcome=str(values.get("outcome") or ""),
             reason=str(values.get("reason") or ""),
             succeeded=bool(values.get("succeeded", False)),
-            feedback={str(path): str(activity) for path, activity in values.get("feedback", {}).items()},
+            feedback=_read_texts(values, "feedback"),
+            location=str(values.get("location") or ""),
+            inputs=_read_texts(values, "inputs"),
+            outputs=_read_texts(values, "outputs"),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ReportError(
             f"task_status: invalid report '{text[:80]}' ({type(error).__name__}: {error}); allowed: JSON with "
             "task, event, state, active and elapsed_s, as run_task publishes"
         ) from error
+
+
+def _read_texts(values: dict[str, Any], key: str) -> dict[str, str]:
+    return {str(name): str(text) for name, text in values.get(key, {}).items()}
 
 
 def machine_frame(

@@ -11,14 +11,17 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from modular_framework_ui.joint_history import JointSample, Quantity
 from modular_framework_ui.task_state import TaskChanges
+
+TIME_DIGITS, VALUE_DIGITS = 3, 5
 
 
 def changes_text(changes: TaskChanges) -> str:
     """Returns the changes as a JSON message.
 
-    The keys are the fields of `TaskChanges` except `revision`. The values of `runs` and `log` are lists of entries with
-    the additional key `index`.
+    The keys are the fields of `TaskChanges` except `revision`. The values of `runs`, `log` and `samples` are lists of
+    entries with the additional key `index`. A sample has a list of values per `Quantity`, in the order of `joints`.
     """
     values: dict[str, Any] = {
         "now_s": changes.now_s,
@@ -29,5 +32,18 @@ def changes_text(changes: TaskChanges) -> str:
         "oldest_run": changes.oldest_run,
         "log": [asdict(line) | {"index": index} for index, line in changes.log.items()],
         "oldest_line": changes.oldest_line,
+        "joints": changes.joints,
+        "samples": [_sample(index, sample) for index, sample in changes.samples.items()],
+        "oldest_sample": changes.oldest_sample,
+        "record": asdict(changes.record),
     }
     return json.dumps(values)
+
+
+def _sample(index: int, sample: JointSample) -> dict[str, Any]:
+    """Returns a sample with a list per quantity; the values are rounded, because samples are most of the messages."""
+    values = zip(Quantity, sample.values, strict=True)
+    return {"index": index, "time_s": round(sample.time_s, TIME_DIGITS)} | {
+        quantity.value: [None if value is None else round(value, VALUE_DIGITS) for value in joints]
+        for quantity, joints in values
+    }

@@ -29,7 +29,10 @@ LIVE_PATH = "/live"
 FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/plots.js": ("plots.js", "text/javascript; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
+    "/uPlot.js": ("uPlot/uPlot.iife.min.js", "text/javascript; charset=utf-8"),
+    "/uPlot.css": ("uPlot/uPlot.min.css", "text/css; charset=utf-8"),
 }
 """File name and MIME type, keyed by URL path; the server serves no other files."""
 MIN_PERIOD_S = 1 / 30

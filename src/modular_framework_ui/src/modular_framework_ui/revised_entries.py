@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
@@ -62,6 +63,11 @@ class RevisedEntries(Generic[Entry]):
     def newest_first(self) -> Iterator[tuple[int, Entry]]:
         """Yields all entries with their indices, newest first."""
         yield from reversed(self._entries.items())
+
+    def added_since(self, revision: int) -> dict[int, Entry]:
+        """Returns the entries that were added after a revision, keyed by index; for entries that never change."""
+        new = itertools.takewhile(lambda item: self._revisions[item[0]] > revision, self.newest_first())
+        return dict(reversed(list(new)))
 
     def changed_since(self, revision: int) -> dict[int, Entry]:
         """Returns the entries that changed after a revision, keyed by index."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS node of the page that shows a running task in a browser."""
+"""ROS node of the page that shows a running task, or the record of an episode, in a browser."""
 
 from __future__ import annotations
 
@@ -90,11 +90,16 @@ class PageNode:
 
 
 def main() -> int:
-    """Runs the node.
+    """Runs the node, or with `--replay RECORD` the page of a record.
 
     Returns:
-        Exit code: 0 after a regular shutdown, 1 if the page cannot be served.
+        Exit code: 0 after a regular shutdown, 1 if the page cannot be served, 2 if the record cannot be replayed.
     """
+    web_folder = Path(rospkg.RosPack().get_path("modular_framework_ui")) / "web"
+    if arguments := rospy.myargv()[1:]:
+        from modular_framework_ui import replay_command  # reads tables, and its import takes seconds
+
+        return replay_command.main(arguments, web_folder)
     # With real time, the page keeps running while simulated time is paused.
     rospy.init_node(_NODE, disable_rostime=True)
     read = DeclaredParameters("modular_framework_ui", _NODE).values
@@ -103,7 +108,7 @@ def main() -> int:
         port = free_port(host, first_port)
         if port != first_port:
             rospy.logwarn("port %s is in use; the page uses port %d", first_port, port)
-        PageNode(Path(rospkg.RosPack().get_path("modular_framework_ui")) / "web", host, port).run()
+        PageNode(web_folder, host, port).run()
     except (AddressError, ParameterError, OSError) as error:
         rospy.logfatal("the page cannot start: %s", error)
         return 1

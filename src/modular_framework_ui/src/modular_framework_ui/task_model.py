@@ -9,17 +9,21 @@ topics.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from modular_framework_core.task_constructor.machine_graph import MachineFrame
+from modular_framework_ui.joint_history import JointHistory, Quantity
 from modular_framework_ui.messages import LogLine, MachineStatus, MachineStructure, TaskReport, machine_frame
 from modular_framework_ui.outcomes import machine_outcome, only_outcome
 from modular_framework_ui.revised_entries import RevisedEntries
-from modular_framework_ui.task_state import Phase, StateRun, TaskChanges, TaskSummary
+from modular_framework_ui.task_state import Phase, ReplayedRecord, StateRun, TaskChanges, TaskSummary
 
 MAX_RUNS = 2000
 MAX_LOG_LINES = 500
+MAX_SAMPLES = 6000
+SAMPLE_PERIOD_S = 0.1
+"""Period of the samples of the joints [s]; the model keeps the samples of the last ten minutes."""
 RESTART_S = 1.0
 """Minimum decrease of the elapsed time at a restart [s]; messages of two threads are out of order by less."""
 
@@ -30,21 +34,30 @@ class TaskModel:
     Args:
         clock: Function that returns the time [s].
         on_change: Function called after each change.
+        sample_period_s: Minimum time between two samples of the joints [s].
     """
 
-    def __init__(self, clock: Callable[[], float], on_change: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        on_change: Callable[[], None] = lambda: None,
+        *,
+        sample_period_s: float = SAMPLE_PERIOD_S,
+    ) -> None:
         self._clock, self._on_change = clock, on_change
         self._lock = threading.RLock()
         self._revision = 0
         self._task = TaskSummary()
         self._runs = RevisedEntries[StateRun](MAX_RUNS)
         self._log = RevisedEntries[LogLine](MAX_LOG_LINES)
+        self._joints = JointHistory(MAX_SAMPLES, sample_period_s)
         self._structures: dict[str, MachineStructure] = {}
         self._statuses: dict[str, MachineStatus] = {}
         self._initial: dict[str, tuple[str, ...]] = {}
         self._last_reports: dict[str, TaskReport] = {}
         self._drawing, self._drawing_revision = "", 0
         self._viewer = ""
+        self._record = ReplayedRecord()
 
     # ---- messages ------------------------------------------------------------------------------------------------
     def note_structure(self, structure: MachineStructure) -> None:
@@ -109,14 +122,40 @@ class TaskModel:
             self._log.add(LogLine(time_s=self._clock(), level=level, node=node, text=text), self._revision + 1)
             self._changed()
 
+    def note_joints(self, joints: Sequence[str], values: Mapping[Quantity, Sequence[float]]) -> None:
+        """Records the latest values of some joints, and samples all joints while a task runs.
+
+        Args:
+            joints: Names of the joints.
+            values: Value of each joint, or nothing, by quantity.
+        """
+        with self._lock:
+            for quantity, latest in values.items():
+                self._joints.note(quantity, joints, latest)
+            is_running = self._task.phase is Phase.RUNNING
+            if is_running and self._joints.sample(self._clock(), self._revision + 1):
+                self._changed()
+
     def note_lost_machine(self, path: str) -> None:
-        """Records the end of the node that published a machine; no effect after the end of the task."""
+        """Records that a machine is no longer published; ends a running task without reports.
+
+        `run_task` publishes a machine per run, so a task with reports may be in its next run.
+        """
         with self._lock:
             for lost in [each for each in self._statuses if each == path or each.startswith(f"{path}/")]:
                 del self._statuses[lost]
-            if self._is_running(path):
-                self._end_task(Phase.LOST, self._clock(), reason="The node of the task ended before the task.")
-                self._changed()
+            if path not in self._last_reports:
+                self._note_lost_task(path)
+
+    def note_lost_reports(self, root: str) -> None:
+        """Records the end of the node that reported a task; no effect after the end of the task."""
+        with self._lock:
+            self._note_lost_task(root)
+
+    def _note_lost_task(self, root: str) -> None:
+        if self._is_running(root):
+            self._end_task(Phase.LOST, self._clock(), reason="The node of the task ended before the task.")
+            self._changed()
 
     def note_drawing(self, svg: str) -> None:
         """Records the drawing of the state machine."""
@@ -128,6 +167,12 @@ class TaskModel:
         """Records the address of the page that shows the world; "" without a viewer."""
         with self._lock:
             self._viewer = address
+            self._changed()
+
+    def note_record(self, record: ReplayedRecord) -> None:
+        """Records that the messages come from a record."""
+        with self._lock:
+            self._record = record
             self._changed()
 
     # ---- state ---------------------------------------------------------------------------------------------------
@@ -151,6 +196,10 @@ class TaskModel:
                 oldest_run=self._runs.oldest,
                 log=self._log.changed_since(revision),
                 oldest_line=self._log.oldest,
+                joints=self._joints.joints,
+                samples=self._joints.sampled_since(revision),
+                oldest_sample=self._joints.oldest,
+                record=self._record,
             )
 
     def _changed(self) -> None:
@@ -175,6 +224,7 @@ class TaskModel:
             self._drawing, self._drawing_revision = "", self._revision + 1
         self._task = TaskSummary(number=self._task.number + 1, root=root, phase=Phase.RUNNING, start_s=start_s)
         self._runs.clear()
+        self._joints.clear()
         for stale in [each for each in self._statuses if self._root_of(each) == root]:
             del self._statuses[stale]
 
@@ -191,12 +241,20 @@ class TaskModel:
         """Returns the last run of a state with its index."""
         return next(((index, run) for index, run in self._runs.newest_first() if run.path == path), None)
 
-    def _open(self, path: str, start_s: float) -> None:
+    def _open(self, path: str, start_s: float, inputs: Mapping[str, str] | None = None) -> None:
         """Starts a run of a state, unless the state already runs."""
         last = self._last_run(path)
         if last is None or last[1].end_s is not None:
-            run = StateRun(path=path, start_s=start_s, is_machine=path in self._structures)
+            run = StateRun(path=path, start_s=start_s, is_machine=path in self._structures, inputs=inputs or {})
             self._runs.add(run, self._revision + 1)
+
+    def _describe(self, path: str, report: TaskReport) -> None:
+        """Adds to the last run of a state where it is defined and what it read, which only reports of the state say."""
+        last = self._last_run(path)
+        if last is not None and not last[1].location and not last[1].inputs:
+            described = replace(last[1], location=report.location, inputs=report.inputs)
+            if described != last[1]:
+                self._set(last[0], described)
 
     def _with_machine_outcome(self, run: StateRun) -> StateRun:
         """Returns the ended run of a machine with its outcome; "" unless the last state determines the outcome."""
@@ -216,9 +274,10 @@ class TaskModel:
             is_child = _machine_of(run.path) == status.path
             if is_child and run.end_s is None and run.path not in active and self._is_followed(run.path):
                 self._set(index, self._ended_by_smach(run, status, now_s))
+        userdata = {} if self._task.root in self._last_reports else status.userdata
         for path in active:
             if self._is_followed(path):
-                self._open(path, now_s)
+                self._open(path, now_s, userdata)
         if status.path == self._task.root and not status.active and self._task.root not in self._last_reports:
             self._end_without_report(now_s)
 
@@ -259,6 +318,7 @@ class TaskModel:
         for state in report.active:
             elapsed_s = report.state_elapsed_s if state == report.state else 0.0
             self._open(f"{root}/{state}", time_s - elapsed_s)
+        self._describe(f"{root}/{report.state}", report)
         feedback = {f"{root}/{state}": activity for state, activity in report.feedback.items()}
         self._task = replace(self._task, feedback=feedback)
 
@@ -268,7 +328,7 @@ class TaskModel:
             return
         has_failed = bool(report.reason)  # a state that fails always has a reason
         ended = replace(last[1], end_s=end_s, outcome=report.outcome, reason=report.reason, has_failed=has_failed)
-        self._set(last[0], ended)
+        self._set(last[0], replace(ended, outputs=report.outputs))
         machine = self._last_run(_machine_of(path))
         if machine is not None and machine[1].end_s is not None:  # smach was faster than the report
             self._set(machine[0], self._with_machine_outcome(machine[1]))

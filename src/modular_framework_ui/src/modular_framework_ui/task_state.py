@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from modular_framework_ui.joint_history import JointSample
 from modular_framework_ui.messages import LogLine
 
 
@@ -59,6 +61,10 @@ class StateRun:
         reason: Reason of a failure; "" without a failure.
         has_failed: Whether the state failed.
         is_machine: Whether the state is a nested machine.
+        location: Position of the definition in the task, as "file:line:column"; "" if unknown.
+        inputs: Text of each userdata value that the state read at its start; without reports of the task, all userdata
+            of the enclosing machine.
+        outputs: Text of each userdata value that the state wrote.
     """
 
     path: str
@@ -68,6 +74,37 @@ class StateRun:
     reason: str = ""
     has_failed: bool = False
     is_machine: bool = False
+    location: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A milestone on the time line.
+
+    Attributes:
+        name: Name of the milestone.
+        time_s: Time [s]; None if missed.
+    """
+
+    name: str
+    time_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayedRecord:
+    """Description of a replayed record.
+
+    Attributes:
+        title: Description of the episode; "" for a running task.
+        omissions: What the record leaves out, as phrases.
+        marks: Milestones of the episode.
+    """
+
+    title: str = ""
+    omissions: tuple[str, ...] = ()
+    marks: tuple[Mark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +121,10 @@ class TaskChanges:
         oldest_run: Index of the oldest kept run.
         log: New log lines, keyed by index.
         oldest_line: Index of the oldest kept log line.
+        joints: Names of the joints.
+        samples: New samples of the joints, keyed by index.
+        oldest_sample: Index of the oldest kept sample.
+        record: Replayed record; without a title for a running task.
     """
 
     revision: int
@@ -95,3 +136,7 @@ class TaskChanges:
     oldest_run: int
     log: dict[int, LogLine]
     oldest_line: int
+    joints: tuple[str, ...]
+    samples: dict[int, JointSample]
+    oldest_sample: int
+    record: ReplayedRecord

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from urllib.parse import quote
 import pandas as pd
 import plotly.graph_objects as go
 
+from modular_framework_benchmark.metrics.recording_files import TASK_RECORDS
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import FAILURE_CLASS, ExperimentResults
 from modular_framework_benchmark.reports.figure_style import (
@@ -28,16 +30,18 @@ MAX_GROUPS = 40
 MAX_EPISODES = 10
 MAX_BARS = 12
 MAX_FILES = 6
+REPLAY_COMMAND = "rosrun modular_framework_ui page --replay"
 _NUMBER_PATTERN = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
 _KIND_OF_SUFFIX = {".log": "log", ".mp4": "video", ".webm": "video", ".bag": "bag"}
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link of the report: visible text, and target relative to the report, percent-encoded."""
+    """A link of the report: visible text, and target relative to the report, percent-encoded; or a command instead."""
 
     text: str
-    target: str
+    target: str = ""
+    command: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +181,9 @@ class _EpisodeReader:
 
 
 def episode_links(folder: str, database_folder: Path, report_folder: Path) -> tuple[Link, ...]:
-    """Returns links to the folder of an episode and its logs, videos and bags; none for a folder outside the base.
+    """Returns links to the folder of an episode and its logs, videos and bags, and the command that replays it.
+
+    There are no links to a folder outside the base.
 
     Args:
         folder: Folder of the episode, relative to `database_folder`; "" for none.
@@ -193,7 +199,9 @@ def episode_links(folder: str, database_folder: Path, report_folder: Path) -> tu
         Link(f"{_KIND_OF_SUFFIX[item.suffix]} {item.name}", _relative(item, report_folder))
         for item in files[:MAX_FILES]
     ]
-    return (Link("folder", _relative(path, report_folder) + "/"), *file_links)
+    replay = [Link("replay", command=f"{REPLAY_COMMAND} {shlex.quote(str(path))}")]
+    has_task = (path / TASK_RECORDS).is_dir()
+    return (Link("folder", _relative(path, report_folder) + "/"), *file_links, *(replay if has_task else ()))
 
 
 def _relative(path: Path, report_folder: Path) -> str:
