@@ -13,6 +13,7 @@ import sqlite3
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -176,7 +177,11 @@ def test_a_reader_writes_nothing(filled: Path) -> None:
     assert EPISODES[1].key in finished(filled)  # it waited beside the database
 
 
-def test_a_locked_database_loses_no_episode(filled: Path) -> None:
+@pytest.mark.parametrize("umask", [0o022, 0o002, 0o000])
+def test_a_locked_database_loses_no_episode(
+    filled: Path, umask: int, request: pytest.FixtureRequest, caplog: pytest.LogCaptureFixture
+) -> None:
+    request.addfinalizer(partial(os.umask, os.umask(umask)))
     with open_database(filled, busy_timeout_s=0.05) as database:
         holder = sqlite3.connect(filled, isolation_level=None)
         holder.execute("BEGIN EXCLUSIVE")
@@ -186,7 +191,7 @@ def test_a_locked_database_loses_no_episode(filled: Path) -> None:
         with pytest.raises(DatabaseLockedError, match="results.db"):
             database.load(1)
         holder.close()
-    assert finished(filled) == {EPISODES[0].key, EPISODES[1].key}
+    assert finished(filled) == {EPISODES[0].key, EPISODES[1].key}, caplog.text
 
 
 def test_a_waiting_record_that_cannot_be_used_stays_with_a_warning(
@@ -221,6 +226,7 @@ by_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files
         pytest.param("folder of another", marks=by_root),
         pytest.param("file of another", marks=by_root),
         "folder that anybody may fill",
+        "file that a group may write",
         "link",
     ],
 )
@@ -236,13 +242,18 @@ def test_planted_records_are_not_taken_in(filled: Path, planted: str, caplog: py
             os.chown(waiting, NOBODY, NOBODY)
         case "folder that anybody may fill":
             waiting.chmod(0o777)
+        case "file that a group may write":
+            file.chmod(0o660)
         case "file of another":
             os.chown(file, NOBODY, NOBODY)
         case _:
             waiting.rename(waiting.with_name("elsewhere"))
             waiting.symlink_to(waiting.with_name("elsewhere"))
     assert finished(filled) == {EPISODES[0].key}
+    refused = file if planted.startswith("file") else waiting
+    mode = 600 if refused is file else 700
     assert "other users may write it" in caplog.text
+    assert f"remove it, or make it your own (chmod {mode})" in caplog.text and str(refused) in caplog.text
     if planted == "folder that anybody may fill":
         waiting.chmod(0o700)
         assert finished(filled) == {EPISODES[0].key, EPISODES[1].key}

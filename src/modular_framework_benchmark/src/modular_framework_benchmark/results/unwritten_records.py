@@ -70,7 +70,7 @@ def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             _require_own(folder)
-            write_atomically(folder / f"{name}.json", content)
+            write_atomically(folder / f"{name}.json", content, mode=0o600)
         except OSError as error:
             _LOG.warning("%s cannot store a record: %s", folder, error)
             continue
@@ -113,6 +113,8 @@ def waiting_records(address: DatabaseAddress, mode_of: Callable[[int], str]) -> 
                 content = json.loads(read_text(path))
                 number = int(content["experiment"])
                 yield UnwrittenRecord(path, number, record_from_json(content["record"], mode_of(number)))
+            except PermissionError as error:
+                _LOG.warning("%s is not imported: %s; remove it, or make it your own (chmod 600)", path, error)
             except UnknownExperimentError as error:
                 _LOG.warning("%s: the record remains unimported: %s", path, error)
             except (OSError, ValueError, KeyError, TypeError) as error:
