@@ -32,7 +32,7 @@ from moveit_msgs.srv import (
 )
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_core import srv
 from modular_framework_core.files import default_folders
@@ -362,8 +362,13 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
         ("deep.yaml", "a: " + "[" * 20000, "nested more than 100 levels deep"),
         (
             "nan.yaml",
-            "kind: plan\nnamed: {p: {joint_trajectory: {points: [{positions: [.nan]}]}}}",
+            "kind: plan\nnamed: {p: {joint_trajectory: {joint_names: [a], points: [{positions: [.nan]}]}}}",
             "positions[0] is nan",
+        ),
+        (
+            "uneven.yaml",
+            "kind: plan\nnamed: {p: {joint_trajectory: {joint_names: [a], points: [{positions: [0, 1, 2]}]}}}",
+            "joint_trajectory.points[0].positions has 3 values for 1 names",
         ),
         ("empty_name.yaml", 'kind: plan\nnamed: {"": {}}\n', "the name is empty"),
         (
@@ -401,6 +406,16 @@ def test_a_joint_state_without_one_value_for_each_name_is_not_taken(managers, wr
     for right in ({"position": [0.0]}, {"position": [0.0], "effort": [1.0]}):
         assert call("add_joint_state", srv.AddJointState, JointState(name=["a"], **right), "even").success
     call("remove_joint_state", srv.RemoveMessage, "even")
+
+
+@pytest.mark.parametrize("field", ["positions", "velocities", "accelerations"])
+def test_a_trajectory_without_one_value_for_each_joint_is_not_taken(managers, field):
+    point = JointTrajectoryPoint(**{field: [0.0] * 3})
+    trajectory = JointTrajectory(joint_names=["a"], points=[point])
+    plan = RobotTrajectory(joint_trajectory=trajectory)
+    assert not call("add_trajectory", srv.AddJointTrajectory, trajectory, "uneven").success
+    assert not call("add_plan", srv.AddMoveitPlan, plan, "uneven").success
+    assert "uneven" not in lists("trajectories")[0] + lists("plans")[0]
 
 
 def test_many_clients_at_the_same_moment_are_answered_without_a_second_try_to_connect(managers):

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 import trimesh
+from geometry_msgs.msg import Transform
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectoryPoint, MultiDOFJointTrajectoryPoint
 
 from modular_framework_core.files import shallow_yaml, yaml_entries
 from modular_framework_core.files.atomic_files import read_text, write_atomically
@@ -167,6 +168,7 @@ def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() 
     state.velocity = [0.0]
     assert position_fault(state) == "velocity has 1 values for 2 names"
     plan = AddMoveitPlanRequest().moveit_plan
+    plan.joint_trajectory.joint_names = ["a"]
     plan.joint_trajectory.points = [
         JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),
         JointTrajectoryPoint(positions=[float("-inf")]),
@@ -175,3 +177,20 @@ def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() 
     grasp = AddStandardisedGraspRequest().grasp_message
     grasp.grasp.pose.pose.orientation.w = float("inf")
     assert position_fault(grasp) == "grasp.pose.pose.orientation.w is inf"
+
+
+def test_points_of_a_trajectory_have_a_value_for_each_joint_or_none() -> None:
+    plan = AddMoveitPlanRequest().moveit_plan
+    plan.joint_trajectory.joint_names = ["a"]
+    plan.joint_trajectory.points = [JointTrajectoryPoint(positions=[0.0]), JointTrajectoryPoint(velocities=[0.0])]
+    assert position_fault(plan) == ""
+    for field in ("positions", "velocities", "accelerations", "effort"):
+        plan.joint_trajectory.points[1] = JointTrajectoryPoint(**{field: [0.0] * 3})
+        assert position_fault(plan) == f"joint_trajectory.points[1].{field} has 3 values for 1 names"
+    plan.joint_trajectory.points = []
+    plan.multi_dof_joint_trajectory.joint_names = ["base"]
+    plan.multi_dof_joint_trajectory.points = [MultiDOFJointTrajectoryPoint(transforms=[Transform()])]
+    plan.multi_dof_joint_trajectory.points[0].transforms[0].rotation.w = 1.0
+    assert position_fault(plan) == ""
+    plan.multi_dof_joint_trajectory.points[0].transforms *= 2
+    assert position_fault(plan) == "multi_dof_joint_trajectory.points[0].transforms has 2 values for 1 names"

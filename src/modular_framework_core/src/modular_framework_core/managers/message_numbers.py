@@ -10,6 +10,11 @@ from modular_framework_core.managers.message_files import fields_of
 
 _LISTS = ("position", "positions")
 _COORDINATES = ("geometry_msgs/Point", "geometry_msgs/Quaternion")
+_VALUES_OF_JOINTS = {
+    "trajectory_msgs/JointTrajectory": ("positions", "velocities", "accelerations", "effort"),
+    "trajectory_msgs/MultiDOFJointTrajectory": ("transforms", "velocities", "accelerations"),
+}
+"""Fields of a trajectory point that are empty or have a value for each joint name, by type of the trajectory."""
 
 
 def position_fault(message: Any, where: str = "") -> str:
@@ -20,9 +25,14 @@ def position_fault(message: Any, where: str = "") -> str:
         where: Path to the message inside the outermost message, for the returned text; "" for the outermost message.
     """
     if message._type == "sensor_msgs/JointState":
-        for name in ("position", "velocity", "effort"):
-            if (count := len(getattr(message, name))) not in (0, len(message.name)):
-                return f"{where}.{name}".lstrip(".") + f" has {count} values for {len(message.name)} names"
+        fault = _count_fault(message, ("position", "velocity", "effort"), len(message.name), where)
+        if fault:
+            return fault
+    for index, point in enumerate(message.points if message._type in _VALUES_OF_JOINTS else ()):
+        place = f"{where}.points[{index}]"
+        fault = _count_fault(point, _VALUES_OF_JOINTS[message._type], len(message.joint_names), place)
+        if fault:
+            return fault
     is_coordinate = message._type in _COORDINATES
     for name, part, is_list in fields_of(message.__class__):
         value = getattr(message, name)
@@ -40,6 +50,14 @@ def position_fault(message: Any, where: str = "") -> str:
             fault = f"{path} is {value}" if is_coordinate and not math.isfinite(value) else ""
         if fault:
             return fault
+    return ""
+
+
+def _count_fault(message: Any, fields: tuple[str, ...], joint_count: int, where: str) -> str:
+    """Returns the fault of the first field that is neither empty nor has a value for each joint name, or ""."""
+    for name in fields:
+        if (count := len(getattr(message, name))) not in (0, joint_count):
+            return f"{where}.{name}".lstrip(".") + f" has {count} values for {joint_count} names"
     return ""
 
 
