@@ -19,6 +19,7 @@ from modular_framework_benchmark.experiments.design import digest_of, plan_episo
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.scheduling import dask_pool
 from modular_framework_benchmark.scheduling.dask_pool import DaskPool
+from modular_framework_benchmark.scheduling.earlier_tries import EARLIER_TRIES, LOST
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import SchedulerError
 from modular_framework_benchmark.scheduling.progress import Progress
@@ -55,6 +56,9 @@ def test_the_episode_of_a_lost_worker_runs_again_and_each_result_is_stored_once(
     ended = Counter((tmp_path / "runs").read_text().split())
     assert set(ended) == {spec.key for spec in episodes}
     assert ended[episodes[3].key] == 1
+    earlier = [record.snapshot.get(EARLIER_TRIES, []) for record in records]
+    assert [len(texts) for texts in earlier] == [spec.number == 3 for spec in episodes]
+    assert earlier[3][0].startswith("begun 2") and earlier[3][0].endswith(f": {LOST}")
     wait_until_none(f"{mark}/")
 
 

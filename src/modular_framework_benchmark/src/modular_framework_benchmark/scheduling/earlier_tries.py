@@ -9,6 +9,8 @@ from pathlib import Path
 
 EARLIER_TRIES = "earlier_tries"
 """Snapshot part with a text for each attempt without a record."""
+LOST = "the worker, the run or the machine was lost during the attempt"
+"""Cause of an attempt whose end nobody logged, as for a lost worker of a Dask cluster."""
 
 
 def begin_try(folder: Path) -> list[str]:
@@ -17,10 +19,13 @@ def begin_try(folder: Path) -> list[str]:
     Args:
         folder: Folder of the episode, whose parent exists.
     """
-    earlier = _notes(folder).read_text(encoding="utf-8").splitlines() if _notes(folder).is_file() else []
+    earlier = _texts(folder)
+    if earlier and ": " not in earlier[-1]:
+        end_try(folder, LOST)
+        earlier = _texts(folder)
     now = datetime.datetime.now(datetime.UTC).isoformat(" ", "seconds")
     _append_note(folder, f"\nbegun {now} on {platform.node()}")
-    return [text for text in earlier if text]
+    return earlier
 
 
 def end_try(folder: Path, cause: str) -> None:
@@ -35,6 +40,11 @@ def forget_tries(folder: Path) -> None:
 
 def _notes(folder: Path) -> Path:
     return folder.with_name(f"{folder.name}.tries")
+
+
+def _texts(folder: Path) -> list[str]:
+    notes = _notes(folder)
+    return [text for text in notes.read_text(encoding="utf-8").splitlines() if text] if notes.is_file() else []
 
 
 def _append_note(folder: Path, text: str) -> None:
