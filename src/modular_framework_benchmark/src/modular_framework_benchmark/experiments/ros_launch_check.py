@@ -169,7 +169,9 @@ class LaunchCheck:
             if value not in robot.groups:
                 yield unknown_name(name, "planning group", value, robot.groups)
         if robot.fault:
-            yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {robot.fault}", ARGUMENTS)
+            value = self.launch.arguments.get("robot_urdf_file", "")
+            named = f"argument 'robot_urdf_file' is '{value}'" if value else "argument 'robot_urdf_file'"
+            yield LaunchFault("robot_urdf_file", f"{named}: {robot.fault}", ARGUMENTS)
             return
         for text in robot.misspelt:
             yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {text}", ARGUMENTS)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from modular_framework_planning.robot_model.multi_dof_joint import FLOATING, PLANAR, MultiDofJoint
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.urdf_extensions import misspelt_extensions
 from modular_framework_simulation.models.xml_nodes import parse_xml
+from modular_framework_urdf.robot import Robot
 from modular_framework_urdf.srdf_reader import read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -70,6 +72,8 @@ def robot_names(urdf: str, srdf: str) -> RobotNames:
         return RobotNames(groups, fault=str(error))
     if robot is None:
         return RobotNames(groups)
+    if fault := _tree_fault(robot):
+        return RobotNames(groups, fault=fault)
     movable = tuple(joint.name for joint in robot.joints if joint.kind != "fixed")
     links = tuple(link.name for link in robot.links)
     joints = tuple(joint.name for joint in robot.joints)
@@ -82,3 +86,21 @@ def _misspelt(urdf: str) -> tuple[str, ...]:
         return tuple(misspelt_extensions(parse_xml(urdf, "robot_description")))
     except DescriptionError:
         return ()  # the simulation reports the reason
+
+
+def _tree_fault(robot: Robot) -> str:
+    """Returns the first fault in the tree of links that the simulation and planning would refuse, or ""."""
+    links = [link.name for link in robot.links]
+    for joint in robot.joints:
+        where = f"robot_description:{joint.line}: joint '{joint.name}'"
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                hint = f"{listing(links)}{nearest(link, links)}"
+                return f"{where} has the {role} link '{link}', which does not exist; {hint}"
+        if joint.is_movable and not any(joint.axis):
+            return f"{where} has the axis 0 0 0; give it a direction, such as 0 0 1"
+    roots = robot.root_links()
+    if len(roots) != 1:
+        names = ", ".join(roots) or "none"
+        return f"{len(roots)} links have no parent joint ({names}); allowed: a URDF with one root link"
+    return ""

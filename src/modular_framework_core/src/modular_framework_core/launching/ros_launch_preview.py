@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import roslaunch.config
@@ -12,6 +12,7 @@ import roslaunch.core
 import roslaunch.xmlloader
 
 from modular_framework_core.launching.external_controllers import controller_node
+from modular_framework_core.launching.launch_arguments import argument_values
 from modular_framework_ros.node_handle import ParameterError
 
 CONTROLLERS_SPAWNER = "external_controllers_spawner"
@@ -45,10 +46,12 @@ class LaunchPreview:
     Attributes:
         nodes: Nodes of the launch.
         parameters: Parameter values by resolved name.
+        arguments: Values of the arguments of the launch file by name.
     """
 
     nodes: tuple[LaunchedNode, ...]
     parameters: Mapping[str, Any]
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
     def with_parameters(self, overrides: Mapping[str, Any]) -> LaunchPreview:
         """Returns a copy with overridden parameters; nested mappings are flattened."""
@@ -114,4 +117,4 @@ def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
             raise roslaunch.core.RLException(f"{path}: {error}") from error
         if spawned is not None:
             nodes.append(LaunchedNode(spawned.package, spawned.node_type, f"/{spawned.name}", "/"))
-    return LaunchPreview(tuple(nodes), parameters)
+    return LaunchPreview(tuple(nodes), parameters, argument_values(path, list(arguments)))
