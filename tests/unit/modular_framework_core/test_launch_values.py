@@ -16,7 +16,7 @@ import rospkg
 
 from modular_framework_core.launching.launch_arguments import check_arguments
 from modular_framework_core.launching.launch_runner import EXIT_BAD_LAUNCH, LaunchSpec, run_launch
-from modular_framework_core.launching.ros_argument_check import unknown_arguments
+from modular_framework_core.launching.ros_argument_check import launched_files
 
 API = "modular_framework_api"
 
@@ -134,7 +134,7 @@ def test_plain_roslaunch_refuses_a_misspelt_argument_before_any_node(start: str)
 
 @pytest.mark.parametrize("command", [["python3", "/usr/bin/rostest"], ["python3", "/usr/bin/roslaunch", "nothing"]])
 def test_other_programs_and_launch_files_that_do_not_exist_are_left_to_themselves(command: list[str]) -> None:
-    assert not list(unknown_arguments([*command, "no.launch", "wrld_file:=bin.world"]))
+    assert launched_files([*command, "no.launch", "wrld_file:=bin.world"]) == ([], [])
 
 
 def test_a_robot_that_xacro_cannot_expand_ends_with_one_sentence(

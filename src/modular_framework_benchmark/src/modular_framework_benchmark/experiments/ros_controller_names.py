@@ -42,7 +42,7 @@ def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterato
         if node.executable != SPAWNER or len(node.arguments.split()) != 2:
             continue
         package, file = node.arguments.split()
-        folder = Path(rospkg.RosPack().get_path(package)) / "controllers"
+        folder = Path(rospkg.RosPack.get_instance().get_path(package)) / "controllers"
         try:
             faults = list(_faults_in(read_controller_file(folder / file), joints))
         except ControllerFileError as error:

@@ -354,10 +354,15 @@ def _folders_of(parameters: Mapping[str, Any], kind: str) -> tuple[Path, ...]:
     return tuple(pipeline.directories_from(str(parameters.get(f"{kind}_directory", ""))))
 
 
-def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:
-    """Returns all faults in the names of a launch file, its arguments and its configuration files.
+def launch_faults(path: str, arguments: Sequence[str], later_files: Sequence[str] = ()) -> list[str]:
+    """Returns all faults in the names of launch files, their arguments and their configuration files.
+
+    Args:
+        path: Launch file.
+        arguments: Launch arguments, `name:=value`.
+        later_files: Launch files loaded afterwards with the same arguments.
 
     Raises:
-        roslaunch.core.RLException: The launch file is invalid.
+        roslaunch.core.RLException: A launch file is invalid.
     """
-    return [fault.text for fault in LaunchCheck(preview_launch(path, arguments)).faults()]
+    return [fault.text for fault in LaunchCheck(preview_launch(path, arguments, later_files)).faults()]

@@ -34,9 +34,14 @@ ARGUMENTS = "arguments"
 
 
 def program_faults(nodes: Iterable[LaunchedNode]) -> Iterator[LaunchFault]:
-    """Yields a fault for each node whose package or program does not exist; roslaunch would start the other nodes."""
-    packages = rospkg.RosPack()
+    """Yields a fault for each node of this machine whose package or program does not exist.
+
+    roslaunch would start the other nodes.
+    """
+    packages = rospkg.RosPack.get_instance()
     for node in nodes:
+        if node.machine:
+            continue
         start = f"node '{node.name}':"
         try:
             program = find_node(node.package, node.executable, packages)

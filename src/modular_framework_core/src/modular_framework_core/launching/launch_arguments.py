@@ -114,3 +114,20 @@ def check_arguments(
         faults = faults_of(argument_values(path, arguments))
     if faults:
         raise ArgumentError(path, faults)
+
+
+def load_error_text(error: Exception, path: str, arguments: list[str]) -> str:
+    """Returns why a launch file cannot be loaded. For the robot description, roslaunch names only the command.
+
+    Args:
+        error: Error of roslaunch.
+        path: Launch file.
+        arguments: Given arguments, `name:=value`.
+    """
+    values = argument_values(path, arguments) if "command parameter [robot_description]" in str(error) else {}
+    if "robot_urdf_file" not in values:
+        return str(error)
+    return (
+        f"argument 'robot_urdf_file' is '{values['robot_urdf_file']}', which xacro cannot expand with urdf_args "
+        f"'{values.get('urdf_args')}'; its error is above"
+    )

@@ -23,7 +23,7 @@ import roslaunch.pmon
 import roslaunch.rlutil
 import rospkg
 
-from modular_framework_core.launching.launch_arguments import argument_values, check_arguments
+from modular_framework_core.launching.launch_arguments import argument_values, check_arguments, load_error_text
 
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
@@ -147,20 +147,9 @@ def run_launch(
         parent.start()
         parent.spin()
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: invalid value
-        print(f"run_framework: {_reason(error, path, arguments)}", file=sys.stderr)
+        print(f"run_framework: {load_error_text(error, path, arguments)}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
     return _report_end(watcher, uuid)
-
-
-def _reason(error: Exception, path: str, arguments: list[str]) -> str:
-    """Returns why a launch could not start. For the robot description, roslaunch names only the command."""
-    if "command parameter [robot_description]" not in str(error):
-        return str(error)
-    values = argument_values(path, arguments)
-    return (
-        f"argument 'robot_urdf_file' is '{values.get('robot_urdf_file')}', which xacro cannot expand with urdf_args "
-        f"'{values.get('urdf_args')}'; its error is above"
-    )
 
 
 def _report_end(watcher: EndWatcher, uuid: str) -> int:

@@ -101,7 +101,7 @@ def _port_faults(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _package_faults(values: Mapping[str, str]) -> Iterator[str]:
-    finder = rospkg.RosPack()
+    finder = rospkg.RosPack.get_instance()
     folders: dict[str, str] = {}
     for name in PACKAGES:
         package = values.get(name, "")
@@ -151,7 +151,7 @@ def _method_faults(value: str) -> Iterator[str]:
         reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is not a launch file"
         yield f"{fault}{reason}; it must be {allowed}"
         return
-    finder = rospkg.RosPack()
+    finder = rospkg.RosPack.get_instance()
     try:
         folder = Path(finder.get_path(package)) / "launch"
     except rospkg.ResourceNotFound:

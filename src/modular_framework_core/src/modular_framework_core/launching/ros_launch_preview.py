@@ -30,6 +30,7 @@ class LaunchedNode:
         name: Resolved name, from /.
         namespace: Namespace, with a trailing /.
         arguments: Command-line arguments.
+        machine: Name of the machine that runs the node; "" if not given.
     """
 
     package: str
@@ -37,6 +38,7 @@ class LaunchedNode:
     name: str
     namespace: str
     arguments: str = ""
+    machine: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,22 +93,34 @@ class _PreviewLoader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
         return "" if name == CHECKED_ARGUMENTS else super().param_value(verbose, name, *source)
 
 
-def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
+def preview_launch(path: str, arguments: Sequence[str], later_files: Sequence[str] = ()) -> LaunchPreview:
     """Returns the nodes and parameters of a launch file. Names of anonymous nodes are not resolved.
 
     Args:
         path: Launch file.
         arguments: Launch arguments, `name:=value`.
+        later_files: Launch files loaded afterwards with the same arguments.
 
     Raises:
         roslaunch.core.RLException: The launch file or a file that it loads is invalid.
     """
     loader = _PreviewLoader(resolve_anon=False)
     config = roslaunch.config.load_config_default(
-        [(path, list(arguments))], None, loader=loader, verbose=False, assign_machines=False
+        [(file, list(arguments)) for file in (path, *later_files)],
+        None,
+        loader=loader,
+        verbose=False,
+        assign_machines=False,
     )
     nodes = [
-        LaunchedNode(node.package, node.type, f"{node.namespace}{node.name}", node.namespace, str(node.args))
+        LaunchedNode(
+            node.package,
+            node.type,
+            f"{node.namespace}{node.name}",
+            node.namespace,
+            str(node.args),
+            node.machine_name or "",
+        )
         for node in config.nodes
     ]
     parameters = leaves({name: item.value for name, item in config.params.items()})
