@@ -85,6 +85,11 @@ def test_a_robot_that_xacro_cannot_expand_is_named_with_its_argument(tmp_path: P
     assert f"argument 'robot_urdf_file' is '{file}', which xacro cannot expand" in ended.stderr
 
 
+def test_regions_that_are_not_valid_yaml_are_named() -> None:
+    ended = end_of_roslaunch(*START, "regions:={a: [")
+    assert ended.stderr.startswith("argument 'regions' is '{a: [', which is not valid YAML: ")
+
+
 JOINT = """<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
 <limit lower="-2" upper="2" effort="10" velocity="1"/></joint>"""
 

@@ -42,6 +42,7 @@ def start() -> str:
         (["viewer_port:=70000"], "is 70000; allowed: a whole number, at least 0 and at most 65535"),
         (["viewer_port:=eight"], "is 'eight'; allowed: a whole number"),
         (["ui_port:=0"], "is 0; allowed: a whole number, at least 1"),
+        (["regions:={a: ["], re.escape("is '{a: [', which is not valid YAML: ") + ".*; allowed: regions such as"),
         (["physics_engine:=bulet"], "is 'bulet'; allowed: pybullet, mujoco"),
     ],
 )
@@ -73,17 +74,25 @@ def test_a_task_that_cannot_be_read_is_refused_before_anything_starts(start: str
     check_arguments(start, [f"task_constructor_script:={broken}", "state_machine_to_load:=machine.py"])
 
 
+@pytest.mark.parametrize(("text", "fault"), [("a: [1", "not valid YAML"), (None, "there is no such file")])
 @pytest.mark.parametrize(
-    ("text", "fault"), [("a: [1", "2:1: this is not valid YAML"), (None, "1:1: there is no such file")]
+    ("file", "arguments"),
+    [
+        ("motion_planner_config.yaml", []),
+        ("external_manipulator_connection.yaml", ["simulation:=false"]),
+        ("sensor_plugins.yaml", ["octomap:=true"]),
+    ],
 )
 def test_a_broken_or_missing_configuration_file_is_named(
-    start: str, tmp_path: Path, text: str | None, fault: str
+    start: str, tmp_path: Path, file: str, arguments: list[str], text: str | None, fault: str
 ) -> None:
     folder = tmp_path / "config"
     shutil.copytree(Path(rospkg.RosPack().get_path(API)) / "config", folder)
-    broken = folder / "motion_planner_config.yaml"
+    broken = folder / file
     broken.unlink() if text is None else broken.write_text(text)
-    with pytest.raises(roslaunch.core.RLException, match=re.escape(f"'{folder}': {broken}:") + ".*" + fault[4:]):
+    with pytest.raises(roslaunch.core.RLException, match=re.escape(f"'{folder}': {broken}:") + f".*{fault}"):
+        check_arguments(start, [f"config_directory:={folder}", *arguments])
+    if arguments:
         check_arguments(start, [f"config_directory:={folder}"])
 
 

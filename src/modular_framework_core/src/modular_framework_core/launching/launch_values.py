@@ -37,6 +37,8 @@ CONFIGURATION_FILES = (
     "manipulator_controller_parameters.yaml",
 )
 """Required files of the configuration folder."""
+CONNECTION_FILE, OCTOMAP_FILE = "external_manipulator_connection.yaml", "sensor_plugins.yaml"
+"""Files of the configuration folder that only a real robot and only an octomap require."""
 NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
 """Optional files of the configuration folder."""
 PORTS = {
@@ -44,7 +46,7 @@ PORTS = {
     "ui_port": ("modular_framework_ui", "page"),
 }
 """Package and name of the node whose parameter `~port` an argument sets. The node may not be part of the launch."""
-SCRIPT, MACHINE = "task_constructor_script", "state_machine_to_load"
+SCRIPT, MACHINE, REGIONS = "task_constructor_script", "state_machine_to_load", "regions"
 
 
 def value_faults(values: Mapping[str, str]) -> list[str]:
@@ -55,6 +57,7 @@ def value_faults(values: Mapping[str, str]) -> list[str]:
     """
     return [
         *_truth_faults(values),
+        *_region_faults(values),
         *file_faults(values),
         *(_number_faults(values) if "robot_package" in values else ()),
     ]
@@ -77,6 +80,19 @@ def _truth_faults(values: Mapping[str, str]) -> Iterator[str]:
     value = values.get("simulation", "true")
     if value.lower() not in ("true", "false", "1", "0"):
         yield f"argument 'simulation' is '{value}'; it must be true or false"
+
+
+def _region_faults(values: Mapping[str, str]) -> Iterator[str]:
+    """Yields the fault of regions that are not valid YAML; the regions themselves are checked with the names."""
+    value = values.get(REGIONS, "")
+    try:
+        shallow_yaml.load(value)
+    except (ValueError, yaml.YAMLError, RecursionError) as error:
+        problem = getattr(error, "problem", None) or error
+        yield (
+            f"argument '{REGIONS}' is '{value}', which is not valid YAML: {problem}; allowed: regions such as "
+            "{NAME: {x: [0.1, 0.2], y: [0.4, 0.5]}}"
+        )
 
 
 def _number_faults(values: Mapping[str, str]) -> Iterator[str]:
@@ -180,13 +196,21 @@ def _folder_faults(values: Mapping[str, str]) -> Iterator[str]:
             f"folder config of modular_framework_api{_path_hint(folder)}"
         )
         return
-    for name in CONFIGURATION_FILES if "robot_package" in values else ():
+    if "robot_package" not in values:
+        return
+    start = f"argument '{CONFIGURATION}' is '{value}'"
+    for name in CONFIGURATION_FILES:
         try:
             located_yaml.load(folder / name, FaultList())
         except TaskFault as error:
-            yield f"argument '{CONFIGURATION}' is '{value}': {error.faults[0]}"
-    for name in NAMES_FILES if "robot_package" in values else ():
-        yield from (f"argument '{CONFIGURATION}' is '{value}': {fault}" for fault in _yaml_faults(folder / name))
+            yield f"{start}: {error.faults[0]}"
+    connection = (CONNECTION_FILE,) if values.get("simulation", "").lower() in ("false", "0") else ()
+    octomap = (OCTOMAP_FILE,) if values.get("octomap", "").lower() in ("true", "1") else ()
+    for name in (*connection, *octomap):
+        if not (folder / name).is_file():
+            yield f"{start}: {folder / name}: there is no such file; add it"
+    for name in (*NAMES_FILES, *connection, *octomap):
+        yield from (f"{start}: {fault}" for fault in _yaml_faults(folder / name))
 
 
 def _yaml_faults(path: Path) -> Iterator[str]:

@@ -18,7 +18,12 @@ import roslaunch.core
 import roslaunch.rlutil
 import rospkg
 
-from modular_framework_core.launching.launch_arguments import known_arguments, load_error_text, unknown_argument
+from modular_framework_core.launching.launch_arguments import (
+    argument_values,
+    known_arguments,
+    load_error_text,
+    unknown_argument,
+)
 from modular_framework_core.launching.launch_values import value_faults
 
 NameFaults = Callable[[Sequence[str], list[str]], Sequence[str]]
@@ -56,6 +61,14 @@ def unknown_arguments(files: Sequence[str], arguments: Sequence[str]) -> Iterato
             yield unknown_argument(name, known_names)
 
 
+def _values_of_files(files: Sequence[str], arguments: list[str]) -> dict[str, str]:
+    """Returns the values of all arguments of the launch files."""
+    try:
+        return {name: value for file in files for name, value in argument_values(file, arguments).items()}
+    except (roslaunch.core.RLException, rospkg.ResourceNotFound):
+        return {}  # roslaunch reports the reason
+
+
 def main(arguments: list[str], name_faults: NameFaults = lambda files, arguments: ()) -> int:
     """Prints the faults of the launch and returns 1 if there are any, which makes roslaunch stop.
 
@@ -65,7 +78,7 @@ def main(arguments: list[str], name_faults: NameFaults = lambda files, arguments
             called only for plain roslaunch and sound arguments.
     """
     files, given = launched_files(psutil.Process(os.getppid()).cmdline())
-    values = dict(argument.split(":=", 1) for argument in arguments)
+    values = _values_of_files(files, given) | dict(argument.split(":=", 1) for argument in arguments)
     faults = [*unknown_arguments(files, given), *value_faults(values)]
     if files and not faults:
         try:
