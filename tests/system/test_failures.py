@@ -133,7 +133,7 @@ def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str
 @pytest.mark.parametrize("node", ["move_group", "gazebo"])
 def test_a_frozen_node_is_named_within_ten_seconds_and_ends_the_task(session: RosSession, node: str) -> None:
     launch = session.run_framework(**HEADLESS)
-    _wait_for_text(launch, "state MovePregrasp ended", TASK_TIMEOUT_S)
+    _wait_for_text(launch, "state machine goes from 'MovePregrasp'", TASK_TIMEOUT_S)
     os.kill(_pid_of(session, node), signal.SIGSTOP)
     _wait_for_text(launch, f"node '/{node}' is frozen", 10.0)
     assert launch.wait(STOP_TIMEOUT_S) == 1, launch.log()
