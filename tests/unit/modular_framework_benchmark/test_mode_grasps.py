@@ -198,7 +198,7 @@ def test_the_process_of_a_method_is_kept_and_warm_and_its_processor_time_is_meas
     assert [record.status for record in records] == [EpisodeStatus.SUCCEEDED] * 2, records[0].cause
     assert len(kept) == 2 and kept[0] == kept[1] and not processes()
     for record in records:
-        assert 0.1 <= record.metrics["method_processor_time"] < 2.0
+        assert 0.08 <= record.metrics["method_processor_time"] < 2.0  # the kernel counts a running thread a tick late
     (name,) = set(records[0].snapshot["methods"]) - {"external_grasps"}
     assert name.endswith(f"{tmp_path.name}/slow_grasps.py")
     assert len(records[0].snapshot["methods"][name]["sources"]) == 64

@@ -88,7 +88,7 @@ def test_the_first_episode_of_a_stack_runs_twice_and_the_second_run_is_recorded(
     records, (stack,) = run_episodes(tmp_path, monkeypatch, succeeded, count=2)
     assert [record.outcome for record in records] == ["run 2", "run 3"]
     assert stack.requests[0] == stack.requests[1] != stack.requests[2]  # the warm-up is the episode itself
-    assert files(tmp_path / "0") == {"of_request_2", "task_records", "log.txt"}
+    assert files(tmp_path / "0") == {"of_request_2", "task_records", "log.txt", "episode.json"}
     assert ["cold_start" in record.snapshot for record in records] == [True, False]
 
 
