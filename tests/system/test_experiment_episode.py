@@ -116,7 +116,8 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
     assert cold.snapshot["cold_start"] and "cold_start" not in warm.snapshot
     logs = [(tmp_path / name / "log.txt").read_text() for name in ("cold", "warm")]
     assert [log.count(" were stored.") for log in logs] == [2, 1]  # generated once to warm up, then in each episode
-    assert [log.count("state machine goes from 'MoveLift'") for log in logs] == [2, 1]  # all plans and motions warm up, too
+    lifts = [log.count("state machine goes from 'MoveLift'") for log in logs]
+    assert lifts == [2, 1]  # all plans and motions warm up, too
     assert len(list((tmp_path / "cold/task_records").iterdir())) == 1
     for record in (cold, warm):
         assert (record.metrics["method_processor_time"] or 0.0) > 0.0
