@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -36,6 +37,7 @@ from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.results import COLD_START, FAILURE_CLASS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_benchmark.results.json_records import record_to_json
+from modular_framework_core.files.atomic_files import write_atomically
 
 EPISODE_PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, with the moment that ends each."""
@@ -145,8 +147,11 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
 
 
 def write_episode(folder: Path, record: EpisodeRecord) -> None:
-    """Writes the record of an episode beside its files, so that the folder is complete without the database."""
-    (folder / EPISODE).write_text(record_to_json(record))
+    """Writes the record of an episode beside its files; prints a failure, which must not lose the episode."""
+    try:
+        write_atomically(folder / EPISODE, record_to_json(record))
+    except OSError as error:
+        print(f"{folder / EPISODE} is not written: {error}", file=sys.stderr, flush=True)
 
 
 def _with_known_names(end: EpisodeEnd, stage: SimulatedStage | None) -> EpisodeEnd:

@@ -8,7 +8,7 @@
 | `parameters.json` | all parameters of the parameter server |
 | `recording.json` | `origin_s`: ROS time at the start of the recording; objects, grasps and reports of the components |
 | `world.json` | record of the world by the simulation, as `read_world` reads it |
-| `episode.json` | record of the episode, as in the database |
+| `episode.json` | record of the episode as in the database, without `earlier_tries` |
 | `task_records/` | record of the task by `run_task`: states with their userdata, and the structure of the machines |
 
 `time_s` is simulated time since the start of the recording.
