@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import urllib.request
 from collections.abc import Iterator
@@ -107,6 +108,7 @@ def write_episode(folder: Path, milestones: tuple[Span, ...] = ()) -> None:
     )
     (folder / "episode.json").write_text(record_to_json(record))
     (folder / "log.txt").write_text(
+        f"[WARN] [{BEGUN - 9.0:.6f}, 8.0]: of the warm-up run\n"
         f"\x1b[33m[ WARN] [{BEGUN + 2.5:.6f}, 52.500000]: slow\x1b[0m\n[INFO] [1.0]: no\nplain text\n"
     )
 
@@ -190,6 +192,15 @@ def test_what_is_no_record_is_refused_with_what_is_allowed(tmp_path: Path, capsy
             read_episode(tmp_path / name)
     assert main(["--replay", str(tmp_path / "absent.json")], WEB) == 2
     assert "absent.json: no record of a task" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["episode.json", "recording.json"])
+@pytest.mark.parametrize("text", ['{"spec": ', "{}", "[1, 2]"])
+def test_an_incomplete_file_of_an_episode_is_refused_or_left_out(tmp_path: Path, name: str, text: str) -> None:
+    write_episode(tmp_path)
+    (tmp_path / name).write_text(text)
+    with contextlib.suppress(ReplayError):
+        assert "the world" in read_episode(tmp_path).omissions
 
 
 @pytest.fixture

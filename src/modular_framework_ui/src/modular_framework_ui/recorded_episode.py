@@ -79,8 +79,19 @@ def read_episode(path: Path) -> RecordedEpisode:
         path: Folder of an episode, or file that `run_task` wrote.
 
     Raises:
-        ReplayError: There is no record of a task.
+        ReplayError: There is no record of a task, or a file of the episode cannot be read.
     """
+    try:
+        return _read_episode(path)
+    except ReplayError:
+        raise
+    except (ValueError, KeyError, TypeError) as error:
+        raise ReplayError(
+            f"{path}: the files of the episode cannot be read ({type(error).__name__}: {error}); they may be incomplete"
+        ) from error
+
+
+def _read_episode(path: Path) -> RecordedEpisode:
     if not path.is_dir():
         task = read_task(path)
         return RecordedEpisode(
@@ -179,7 +190,7 @@ def _joints_of(folder: Path, task: RecordedTask, origin_s: float | None) -> Join
 
 
 def _read_log(path: Path, begun: float) -> tuple[LogLine, ...]:
-    """Returns the warnings and errors of a log.
+    """Returns the warnings and errors of a log since the start of the task, without those of a warm-up run.
 
     Args:
         path: File with the output of the launch.
@@ -188,4 +199,8 @@ def _read_log(path: Path, begun: float) -> tuple[LogLine, ...]:
     if not path.is_file():
         return ()
     found = _LOG_LINE.findall(_COLOURS.sub("", path.read_text(encoding="utf-8", errors="replace")))
-    return tuple(LogLine(time_s=float(time) - begun, level=level, node="", text=text) for level, time, text in found)
+    return tuple(
+        LogLine(time_s=float(time) - begun, level=level, node="", text=text)
+        for level, time, text in found
+        if float(time) >= begun
+    )

@@ -249,7 +249,7 @@ class TaskModel:
             self._runs.add(run, self._revision + 1)
 
     def _describe(self, path: str, report: TaskReport) -> None:
-        """Adds to the last run of a state where it is defined and what it read, which only reports of the state say."""
+        """Adds location and inputs to the last run of a state; only the state's own reports contain them."""
         last = self._last_run(path)
         if last is not None and not last[1].location and not last[1].inputs:
             described = replace(last[1], location=report.location, inputs=report.inputs)
