@@ -58,6 +58,22 @@ def children() -> list[psutil.Process]:
     return psutil.Process().children(recursive=True)
 
 
+def test_each_call_leaves_its_own_input_in_the_folder_of_recorded_inputs(
+    tmp_path: Path, box_request: GraspRequest
+) -> None:
+    source = MethodSource(command=(sys.executable, FAULTY_METHOD, "none"), record_folder=str(tmp_path / "inputs"))
+    client = MethodClient(source, GRASPS, MethodLimits())
+    try:
+        client.call(box_request)
+        first = {path.name: path.read_bytes() for path in (tmp_path / "inputs").iterdir()}
+        client.call(box_request)
+        (tmp_path / "inputs" / next(iter(first))).unlink()
+        client.call(box_request)
+        assert len(list((tmp_path / "inputs").iterdir())) == 2
+    finally:
+        client.close()
+
+
 def test_a_method_in_another_process_returns_its_result(make_client: MakeClient, box_request: GraspRequest) -> None:
     started_s = time.perf_counter()
     client = make_client("takes its time")

@@ -109,6 +109,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     method = folder / f"{options.name}.py"
     print(f"created {method}, test_{options.name}.py and experiment.yaml; next:")
     print(f"  {sys.executable} -m mbf_method.check_method --kind {options.kind} -- {sys.executable} {method}")
+    if options.kind == "planner":
+        problems = f"panda_hand_moveit_config panda_arm {folder / 'problems'} --count 20"
+        print(f"  rosrun modular_framework_benchmark make_problems {problems}")
     print(f"  rosrun modular_framework_benchmark run_experiment {folder / 'experiment.yaml'}")
     return 0
 

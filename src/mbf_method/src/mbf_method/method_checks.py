@@ -67,6 +67,7 @@ def check_grasp_method(call: Call, requests: Sequence[GraspRequest]) -> Findings
     """
     faults: list[str] = []
     notes: list[str] = []
+    found = 0
     for number, request in enumerate(requests, start=1):
         name = f"input {number} (object '{request.target.name}')"
         try:
@@ -77,10 +78,11 @@ def check_grasp_method(call: Call, requests: Sequence[GraspRequest]) -> Findings
         if not len(grasps.scores):
             notes.append(f"{name}: no grasp.")
             continue
+        found += 1
         low = _fraction_below_support(grasps, request)
         notes.append(f"{name}: {len(grasps.scores)} grasps, {low:.0%} of them unreachable below the support.")
         faults += [f"{name}: {text}" for text in _grasp_faults(grasps, request)]
-    if not faults and not any("support." in text for text in notes):
+    if not faults and not found:
         faults.append("the method found no grasp for any input.")
     return Findings(tuple(faults), tuple(notes))
 

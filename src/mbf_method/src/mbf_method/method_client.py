@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import socket
 import threading
 import time
@@ -29,6 +31,7 @@ from mbf_method.errors import (
 from mbf_method.method_process import MethodProcess
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
 
+LOGGER = logging.getLogger("mbf_method")
 RETRY_PERIOD_S = 0.05
 CANCEL_PERIOD_S = 0.1
 EXIT_TIMEOUT_S = 2.0
@@ -265,9 +268,12 @@ def _response(connection: ClientConnection, is_cancelled: Callable[[], bool] | N
 
 
 def _record(request: bytes, folder: Path) -> None:
-    """Writes an encoded request to the next free number in a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{len(list(folder.glob('*.msgpack'))) + 1:04d}.msgpack").write_bytes(request)
+    """Writes an encoded request to a new file in a folder; names are in the order of the calls. Logs a failure."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{time.time_ns()}_{os.getpid()}.msgpack").write_bytes(request)
+    except OSError as error:
+        LOGGER.warning("a request is not recorded: %s", error)
 
 
 @contextmanager

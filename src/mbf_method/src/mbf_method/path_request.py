@@ -58,7 +58,8 @@ class PathRequest:
         srdf: Semantic description of the robot: groups, named states, end effectors.
         planner: Name of the planner in the experiment; "" for none.
         parameters: Parameters of the planner in the experiment, keyed by name.
-        allowed_time_s: Time in which the path must be returned [s].
+        allowed_time_s: Time for the whole plan, from the start of the request in the framework [s]; the process
+            has a little less.
         seed: Seed of all random numbers.
     """
 
