@@ -542,8 +542,12 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_ball_joint_state(self, number: int, index: int, rotation: Quaternion, rate: Vector3) -> None:
         """Sets rotation and angular velocity of a ball joint."""
-        self._rest.wake(number)
-        self.api.resetJointStateMultiDof(self._id(number), index, rotation, rate, physicsClientId=self.client)
+        self._rest.wake_touching(number)
+
+        def set_state() -> None:
+            self.api.resetJointStateMultiDof(self._id(number), index, rotation, rate, physicsClientId=self.client)
+
+        self._rest.disturb(number, set_state)
 
     def release_ball_joint(self, number: int, index: int) -> None:
         """Removes the engine's default motor of a ball joint."""
