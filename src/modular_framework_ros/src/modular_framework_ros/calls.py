@@ -42,9 +42,9 @@ class CallError(RuntimeError):
 class MotionTimeout:
     """Counts the slower of real time and the ROS clock, from its creation.
 
-    A simulation slower than real time needs more real time for the same motion, and a faster one leaves a node less
-    simulated time to respond. While the ROS clock stands still, because the world is paused or time is held, real time
-    counts alone. A reset of the clock to an earlier time counts nothing.
+    If the simulation is slower than real time, a motion takes more real time. If the simulation is faster, a node has
+    less real time to respond within the same simulated time. While the ROS clock stands still, because the world is
+    paused or time is held, real time counts alone. A reset of the clock to an earlier time counts nothing.
 
     Args:
         limit_s: Timeout [s].

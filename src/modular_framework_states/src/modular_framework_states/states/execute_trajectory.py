@@ -32,7 +32,7 @@ class ExecuteTrajectory(FrameworkState):
 
     The motion from the current position to the first point is included. As no planner has checked the trajectory, its
     path is first checked for collisions, and each segment for the joints' maximum velocities. Points without velocities
-    are passed smoothly. If their times would require more than the maximum accelerations, the motion takes longer.
+    are passed smoothly. If the smooth motion would exceed maximum velocities or accelerations, it takes longer.
 
     Args:
         trajectory_name: Name of the trajectory; empty for the oldest anonymous trajectory. The input key

@@ -18,7 +18,8 @@ from modular_framework_planning.trajectory_processing.jerk_limits import (
 class AddRuckigTrajectorySmoothing(RequestAdapter):
     """Limits the jerk to `max_jerk` of joint_limits.yaml (has_jerk_limits), 1000 rad/s^3 by default.
 
-    The result is the faster of the moving average and the trajectory slowed down uniformly that passes the validation.
+    The result is the moving average if it is faster than the uniformly slowed trajectory and passes the validation;
+    otherwise, it is the slowed trajectory.
     """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
