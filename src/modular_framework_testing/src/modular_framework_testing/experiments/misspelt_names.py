@@ -199,14 +199,26 @@ def in_launch(argument: str, words: str, package: str = "modular_framework_api")
     """
 
     def refusal_text(folder: Path) -> str:
-        path = roslaunch.rlutil.resolve_launch_arguments([package, "start_framework.launch"])[0]
-        try:
-            check_arguments(path, [argument])
-            return "\n".join(launch_faults(path, [argument]))
-        except roslaunch.core.RLException as error:
-            return str(error)
+        return _launch_refusal([argument], package)
 
     return Case("run_framework", argument, refusal_text, words)
+
+
+def _launch_refusal(arguments: list[str], package: str = "modular_framework_api") -> str:
+    """Returns the faults of launch arguments of run_framework; "" without a fault."""
+    path = roslaunch.rlutil.resolve_launch_arguments([package, "start_framework.launch"])[0]
+    try:
+        check_arguments(path, arguments)
+        return "\n".join(launch_faults(path, arguments))
+    except roslaunch.core.RLException as error:
+        return str(error)
+
+
+def _copy_configuration(folder: Path) -> None:
+    """Copies the shipped configuration files to a folder."""
+    shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
+    for path in shipped.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
 
 
 def in_config(file: str, key: str, value: Any, words: str) -> Case:
@@ -220,12 +232,10 @@ def in_config(file: str, key: str, value: Any, words: str) -> Case:
     """
 
     def refusal_text(folder: Path) -> str:
-        shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
-        for path in shipped.iterdir():
-            (folder / path.name).write_bytes(path.read_bytes())
+        _copy_configuration(folder)
         content = yaml.safe_load((folder / file).read_text())
         (folder / file).write_text(yaml.safe_dump(changed_experiment(content, tuple(key.split("/")), value)))
-        return in_launch(f"config_directory:={folder}", "").refusal_text(folder)
+        return _launch_refusal([f"config_directory:={folder}"])
 
     return Case(file, f"{key}: {value}", refusal_text, words)
 
@@ -246,15 +256,11 @@ def in_hardware(old: str, new: str, words: str) -> Case:
     """
 
     def refusal_text(folder: Path) -> str:
-        shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
-        for path in shipped.iterdir():
-            (folder / path.name).write_bytes(path.read_bytes())
+        _copy_configuration(folder)
         text = (folder / "connection_hardware.yaml").read_text()
         (folder / "connection_hardware.yaml").write_text(_replace_first(text, old, new))
-        path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
         arguments = [f"config_directory:={folder}", "simulation:=false", "task_constructor_script:=pick_and_hold.yaml"]
-        check_arguments(path, arguments)
-        return "\n".join(launch_faults(path, arguments))
+        return _launch_refusal(arguments)
 
     return Case("connection_hardware.yaml", new, refusal_text, words)
 
@@ -484,7 +490,7 @@ def in_launched_task(text: str, words: str) -> Case:
 
     def refusal_text(folder: Path) -> str:
         (folder / "own.yaml").write_text(text)
-        return in_launch(f"task_constructor_script:={folder / 'own.yaml'}", "").refusal_text(folder)
+        return _launch_refusal([f"task_constructor_script:={folder / 'own.yaml'}"])
 
     return Case("task of run_framework", text.rpartition("{source")[2].split("\n")[0], refusal_text, words)
 
