@@ -39,7 +39,7 @@ def smooth_timing(times: Array, positions: Array, max_velocities: Array, max_acc
     Raises:
         ValueError: The times do not increase.
     """
-    from scipy.interpolate import PchipInterpolator  # slow to import
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator  # slow to import
 
     steps = np.diff(times)
     if (steps <= 0.0).any():
@@ -50,27 +50,24 @@ def smooth_timing(times: Array, positions: Array, max_velocities: Array, max_acc
         )
     velocities = np.asarray(PchipInterpolator(times, positions, axis=0)(times, 1))
     velocities[[0, -1]] = 0.0
-    excess = _excess(steps[:, None], np.diff(positions, axis=0), velocities, (max_velocities, max_accelerations))
+    excess = _excess(CubicHermiteSpline(times, positions, velocities), (max_velocities, max_accelerations))
     part = np.cumsum(~velocities.any(axis=1)) - 1  # of each waypoint; a part begins at a point of rest
     factors = np.array([excess[part[:-1] == number].max(initial=1.0) for number in range(part[-1] + 1)])
     slowed = np.concatenate([times[:1], times[0] + np.cumsum(steps * factors[part[:-1]])])
     return SmoothTiming(np.round(slowed, 9), velocities / factors[part][:, None])
 
 
-def _excess(steps: Array, moves: Array, velocities: Array, limits: tuple[Array, Array]) -> Array:
+def _excess(curve: Any, limits: tuple[Array, Array]) -> Array:
     """Returns the factor by which each segment must be slowed down, at least 1, shape (n - 1,).
 
     Args:
-        steps: Durations of the segments, shape (n - 1, 1) [s].
-        moves: Displacements, shape (n - 1, joints) [rad or m].
-        velocities: Velocities at the waypoints, shape (n, joints).
+        curve: SciPy's cubics through the n waypoints.
         limits: Velocity and acceleration limits, each of shape (joints,).
     """
-    first, last, means = velocities[:-1], velocities[1:], moves / steps
-    s = np.linspace(0.0, 1.0, SAMPLES)[:, None, None]
-    speeds: Any = 6.0 * s * (1.0 - s) * means + (1.0 - 4.0 * s + 3.0 * s**2) * first + (3.0 * s**2 - 2.0 * s) * last
-    starts = (6.0 * means - 4.0 * first - 2.0 * last) / steps
-    ends = (-6.0 * means + 2.0 * first + 4.0 * last) / steps
+    steps = np.diff(curve.x)
+    speeds = curve(curve.x[:-1] + np.linspace(0.0, 1.0, SAMPLES)[:, None] * steps, 1)
+    rates, starts = curve.derivative(2).c
+    ends = starts + rates * steps[:, None]
     velocity_ratio = (np.abs(speeds).max(axis=0) / limits[0]).max(axis=1)
     acceleration_ratio = (np.maximum(np.abs(starts), np.abs(ends)) / limits[1]).max(axis=1)
     ratio = np.maximum(velocity_ratio, np.sqrt(acceleration_ratio)) * (1.0 + MARGIN)

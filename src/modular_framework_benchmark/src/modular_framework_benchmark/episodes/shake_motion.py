@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from modular_framework_benchmark.metrics.measurements import Array
 from modular_framework_urdf.joint_limits import JointLimits
@@ -66,8 +67,5 @@ def _peak_acceleration(times: Array, positions: Array, velocities: Array) -> flo
         positions: Positions, shape (n,) [m].
         velocities: Velocities, shape (n,) [m/s].
     """
-    steps, moves = np.diff(times), np.diff(positions)
-    first, last = velocities[:-1], velocities[1:]
-    starts = (6.0 * moves / steps - 4.0 * first - 2.0 * last) / steps
-    ends = (-6.0 * moves / steps + 2.0 * first + 4.0 * last) / steps
-    return float(np.abs([starts, ends]).max())
+    rates, starts = CubicHermiteSpline(times, positions, velocities).derivative(2).c
+    return float(np.abs([starts, starts + rates * np.diff(times)]).max())
