@@ -30,6 +30,7 @@ from modular_framework_benchmark.records.used_software import (
     named_solvers,
     solver_substitutions,
 )
+from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_ros.reported_figures import SOURCES_PARAMETER
@@ -44,7 +45,7 @@ EXTERNAL_PARAMETERS = ("command", "address", SOURCES_PARAMETER)
 NODE_TIMEOUT_S = 5.0
 KINEMATICS_PARAMETER = "/robot_description_kinematics"
 DETECTORS = ("/move_group/collision_detector", "/collision_detector")
-WORLD, MODEL_PATH = "/gazebo/world_file", "/gazebo_model_path"
+WORLD = "/gazebo/world_file"
 DESCRIPTION_PARAMETERS = ("/robot_description", "/robot_description_semantic")
 
 

@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
 from modular_framework_benchmark.records.episode_settings import PlacedObject, model_file
 from modular_framework_benchmark.records.perturbation import ObjectPerturbation
+from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.model_variants import changed_model, read_scaled
@@ -221,7 +222,7 @@ def _displace_perceived(name: str, error: tuple[float, ...]) -> None:
 
 def _description(placed: PlacedObject) -> str:
     """Returns the SDF text of an object with its size and its perturbation."""
-    path = model_file(placed.model, str(rospy.get_param("/gazebo_model_path", "")))
+    path = model_file(placed.model, str(rospy.get_param(MODEL_PATH, "")))
     perturbed = placed.perturbed or ObjectPerturbation()
     try:
         text = read_scaled(path, placed.scale)

@@ -44,6 +44,7 @@ from modular_framework_core.launching.ros_declared_names import DeclaredNames, L
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
 from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import (
+    MODEL_PATH,
     KnownNames,
     PlannerNames,
     model_of,
@@ -61,7 +62,6 @@ from modular_framework_ros.allowed_names import closest, listing, nearest
 DESCRIPTION = "robot_description"
 PIPELINES = "planning_pipelines"
 RUN_TASK = "run_task"
-MODEL_PATH = "/gazebo_model_path"
 
 
 class LaunchCheck:
@@ -334,8 +334,7 @@ class LaunchCheck:
         names = names_of_config(Path(config)) if config else KnownNames()
         srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
         names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
-        folders = str(self.launch.parameters.get(MODEL_PATH) or "")
-        names = names.with_object_types(folders, f"the parameter {MODEL_PATH}, {folders}") if folders else names
+        names = names.with_object_types(str(self.launch.parameters.get(MODEL_PATH) or ""))
         names = names.with_regions(
             self.launch.below(REGIONS), "the launch argument 'regions', or to 'regions' of the experiment"
         )

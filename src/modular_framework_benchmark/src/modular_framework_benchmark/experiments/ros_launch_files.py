@@ -22,7 +22,12 @@ from modular_framework_core.managers.named_joint_states import NamedJointState, 
 from modular_framework_core.managers.named_poses import load_poses
 from modular_framework_core.managers.named_trajectories import load_trajectories
 from modular_framework_core.scene.sensor_frames import load_sensor_frames
-from modular_framework_core.task_constructor.known_names import JOINT_STATES_FILE, POSES_FILE, TRAJECTORIES_FILE
+from modular_framework_core.task_constructor.known_names import (
+    JOINT_STATES_FILE,
+    MODEL_PATH,
+    POSES_FILE,
+    TRAJECTORIES_FILE,
+)
 from modular_framework_core.task_runner.manipulator_links import manipulator_links
 from modular_framework_planning.perception.sensor_settings import read_sensors
 from modular_framework_ros.allowed_names import closest, listing, nearest
@@ -99,7 +104,7 @@ def models_of_launch(launch: LaunchPreview) -> tuple[str, ...] | None:
     file = Path(str(launch.parameters.get(f"{node.name}/world_file") or "")) if node is not None else Path()
     if not file.is_absolute() or not file.is_file():
         return None
-    return tuple(models_of_world(file, str(launch.parameters.get("/gazebo_model_path") or "")))
+    return tuple(models_of_world(file, str(launch.parameters.get(MODEL_PATH) or "")))
 
 
 def _region_faults(launch: LaunchPreview) -> Iterator[LaunchFault]:

@@ -28,7 +28,7 @@ from modular_framework_benchmark.episodes.ros_file_digests import (
     world_files,
 )
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest, tree_files
-from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTION_PARAMETERS, MODEL_PATH, WORLD
+from modular_framework_benchmark.episodes.ros_running_stack import DESCRIPTION_PARAMETERS, WORLD
 from modular_framework_benchmark.episodes.ros_stack_launch import StackPreview, preview_stack
 from modular_framework_benchmark.episodes.snapshot import RECORDED_PACKAGES, package_version
 from modular_framework_benchmark.experiments.grasps_mode import GraspSettings
@@ -42,6 +42,7 @@ from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.episode_settings import EpisodeSettings, model_file
 from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combination_key, digests_text
 from modular_framework_core.launching.ros_launch_preview import leaves
+from modular_framework_core.task_constructor.known_names import MODEL_PATH
 
 FOLDER_PARAMETERS = ("states_directory", "templates_directory")
 """Launch arguments that name folders of the user's code."""

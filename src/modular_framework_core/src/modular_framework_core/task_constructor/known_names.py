@@ -22,6 +22,8 @@ _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
 PLANNER, MODEL, SERIES, OBJECT_TYPE = "planner", "model", "series", "object_type"
 MODEL_FILE = "model.sdf"
+MODEL_PATH = "/gazebo_model_path"
+"""Parameter with the folders of models."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,18 +105,23 @@ class KnownNames:
         names, origins = {**self.names, MODEL: frozenset(models)}, {**self.origins, MODEL: origin}
         return replace(self, names=names, origins=origins | {SERIES: origin})
 
-    def with_object_types(self, path: str, origin: str) -> KnownNames:
-        """Returns a copy with the types of objects: the folders of models.
+    def with_object_types(self, path: str, origin: str = "") -> KnownNames:
+        """Returns a copy with the types of objects: the folders of models; unchanged for an empty path.
 
         Args:
-            path: Folders with one folder per model, separated by colons, as in the parameter `gazebo_model_path`.
-            origin: Source of the path, for messages.
+            path: Folders with one folder per model, separated by colons, as in the parameter MODEL_PATH.
+            origin: Source of the path, for messages; the parameter by default.
         """
+        if not path:
+            return self
         folders = [Path(folder) for folder in path.split(":") if folder]
         types = frozenset(
             str(file.parent.relative_to(folder)) for folder in folders for file in folder.glob(f"**/{MODEL_FILE}")
         )
-        names, origins = {**self.names, OBJECT_TYPE: types}, {**self.origins, OBJECT_TYPE: origin}
+        names, origins = (
+            {**self.names, OBJECT_TYPE: types},
+            {**self.origins, OBJECT_TYPE: origin or f"the parameter {MODEL_PATH}, {path}"},
+        )
         return replace(self, names=names, origins=origins)
 
     def with_planners(self, planners: Callable[[], PlannerNames | None]) -> KnownNames:

@@ -44,7 +44,7 @@ from modular_framework_core.commander.ros_planner_names import planners_by_pipel
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator, loading, pipeline
-from modular_framework_core.task_constructor.known_names import KnownNames, PlannerNames, names_of_config
+from modular_framework_core.task_constructor.known_names import MODEL_PATH, KnownNames, PlannerNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder
 from modular_framework_core.task_runner.ros_introspection import TaskIntrospection
@@ -63,7 +63,6 @@ from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 
-MODEL_PATH = "/gazebo_model_path"
 STOP_GRACE_S = 0.6
 """Time for running states to stop before the node exits without them [s]."""
 
@@ -411,8 +410,7 @@ def _known_names() -> KnownNames:
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
     names = names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
-    folders = str(rospy.get_param(MODEL_PATH, "") or "")
-    names = names.with_object_types(folders, f"the parameter {MODEL_PATH}, {folders}") if folders else names
+    names = names.with_object_types(str(rospy.get_param(MODEL_PATH, "") or ""))
     return names.with_planners(_planners)
 
 
