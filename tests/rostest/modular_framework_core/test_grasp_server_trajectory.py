@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 
 import actionlib
 import pytest
@@ -12,6 +13,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal
@@ -24,6 +26,7 @@ LAUNCH = f"""<launch>
     {JOINT.format(name="b")}&lt;/robot&gt;'/>
   <param name="robot_description_semantic" value='&lt;robot name="r"&gt;&lt;group name="hand"&gt;&lt;joint name="a"/&gt;
     &lt;joint name="b"/&gt;&lt;/group&gt;&lt;/robot&gt;'/>
+  <param name="robot_description_planning/joint_limits/b/max_acceleration" value="10.0"/>
   <param name="manipulator_group_name" value="hand"/>
   <node name="grasper" pkg="modular_framework_core" type="moveit_grasp_action_server" output="screen" required="true">
     <param name="motion_duration" value="0.3"/>
@@ -40,6 +43,7 @@ class FakeHand:
         self.positions = {"a": 0.0, "b": 0.0}
         self.obstacle = float("inf")
         self.fault = ""
+        self.trajectories: list[JointTrajectory] = []
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1)
         self._server = actionlib.SimpleActionServer(
             "hand/follow_joint_trajectory", FollowJointTrajectoryAction, self._follow, False
@@ -55,6 +59,7 @@ class FakeHand:
             time.sleep(0.02)
 
     def _follow(self, goal: FollowJointTrajectoryGoal) -> None:
+        self.trajectories.append(goal.trajectory)
         point = goal.trajectory.points[-1]
         time.sleep(point.time_from_start.to_sec())
         wanted = dict(zip(goal.trajectory.joint_names, point.positions, strict=True))
@@ -78,9 +83,9 @@ def hand(ros_launch) -> FakeHand:
     return fake
 
 
-def send(hand: FakeHand, stage: int) -> tuple[int, tuple[bool, bool, bool], str]:
+def send(hand: FakeHand, stage: int, opening: Sequence[float] = (0.2, 0.4)) -> tuple[int, tuple[bool, bool, bool], str]:
     pose = generate_pose_stamped_message("world", (0, 0, 0), (0, 0, 0))
-    message = get_standardised_grasp(["a", "b"], [0.2, 0.4], [1.5, 1.5], [1.0, 1.0], [1.0, 1.0], pose, pose, pose)
+    message = get_standardised_grasp(["a", "b"], list(opening), [1.5, 1.5], [1.0, 1.0], [1.0, 1.0], pose, pose, pose)
     hand.client.send_goal(GraspGoal(GraspCommand(grasp_state=stage, grasp=message, max_torque=400.0)))
     assert hand.client.wait_for_result(rospy.Duration(60))
     result = hand.client.get_result()
@@ -92,6 +97,20 @@ def test_a_posture_of_two_joints_is_reached(hand: FakeHand) -> None:
     state, flags, text = send(hand, GraspCommand.PRE_GRASP_STATE)
     assert (state, flags) == (GoalStatus.SUCCEEDED, (True, False, False)), text
     assert hand.positions == {"a": 0.2, "b": 0.4}
+
+
+def test_a_short_motion_has_the_configured_duration_and_a_long_one_keeps_the_limits(hand: FakeHand) -> None:
+    send(hand, GraspCommand.PRE_GRASP_STATE, [0.1, 0.1])
+    for opening, duration_s in (
+        ([0.11, 0.11], 0.3),
+        ([1.3, 0.11], 1.5 * 1.19 / 3.0),
+        ([1.3, 1.3], (6.0 * 1.19 / 10.0) ** 0.5),
+    ):
+        send(hand, GraspCommand.PRE_GRASP_STATE, opening)
+        (point,) = hand.trajectories[-1].points
+        assert point.velocities == (0.0, 0.0)  # a cubic from rest to rest: 1.5 times the mean velocity, 6 d/T^2
+        assert point.time_from_start.to_sec() == pytest.approx(duration_s, abs=0.002)
+    send(hand, GraspCommand.PRE_GRASP_STATE)
 
 
 def test_fingers_resting_short_of_their_targets_hold_something(hand: FakeHand) -> None:

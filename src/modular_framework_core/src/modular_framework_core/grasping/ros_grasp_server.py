@@ -154,7 +154,8 @@ def read_manipulator() -> Group:
             "load the robot and manipulator_controller_parameters.yaml first"
         )
     name, urdf, srdf = (str(rospy.get_param(parameter)) for parameter in names)
-    group = read_group(urdf, srdf, name)
+    limits = rospy.get_param("robot_description_planning/joint_limits", {})
+    group = read_group(urdf, srdf, name, limits if isinstance(limits, dict) else {})
     if not group.joints:
         raise RobotModelError(f"planning group '{name}' has no active joint; use the planning group of the fingers")
     return group
@@ -188,7 +189,8 @@ def main() -> int:
     read = DeclaredParameters("modular_framework_core", "moveit_grasp_action_server").values
     duration_s, name = read("~motion_duration", "manipulator_controller_action_server_name")
     try:
-        server = GraspServer(read_manipulator(), ControlledManipulator(read_controllers(), duration_s))
+        group = read_manipulator()
+        server = GraspServer(group, ControlledManipulator(read_controllers(), group, duration_s))
     except RobotModelError as error:
         rospy.logfatal("moveit_grasp_action_server: %s", error)
         return 1

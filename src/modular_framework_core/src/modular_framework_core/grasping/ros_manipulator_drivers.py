@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -19,6 +20,7 @@ from control_msgs.msg import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from modular_framework_core.commander.robot_groups import Group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.grasping.grasp_server import GraspCommandError, Outcome, refuse_no_effort
 from modular_framework_ros.action_client import SteadyActionClient
@@ -101,13 +103,17 @@ class GripperDriver:
 class TrajectoryDriver:
     """Driver of a controller with the action control_msgs/FollowJointTrajectory.
 
+    A motion starts and ends at rest, and controllers interpolate it by a cubic polynomial. A motion that would exceed
+    the limits of a joint lasts longer than `duration_s`.
+
     Args:
         action: Name of the action.
-        duration_s: Duration of a motion [s].
+        group: Planning group of the fingers, with the limits of their velocities and accelerations.
+        duration_s: Shortest duration of a motion [s].
     """
 
-    def __init__(self, action: str, duration_s: float) -> None:
-        self._action, self._duration_s = action, duration_s
+    def __init__(self, action: str, group: Group, duration_s: float) -> None:
+        self._action, self._group, self._duration_s = action, group, duration_s
         self._client = SteadyActionClient(action, FollowJointTrajectoryAction)
 
     def move(self, motion: Motion, monitor: JointMonitor) -> Outcome:
@@ -122,7 +128,9 @@ class TrajectoryDriver:
         goal.trajectory.joint_names = list(motion.targets)
         goal.trajectory.points = [
             JointTrajectoryPoint(
-                positions=list(motion.targets.values()), time_from_start=rospy.Duration.from_sec(self._duration_s)
+                positions=list(motion.targets.values()),
+                velocities=[0.0] * len(motion.targets),
+                time_from_start=rospy.Duration.from_sec(self._time_s(motion, monitor)),
             )
         ]
         self._client.send_goal(goal)
@@ -137,14 +145,25 @@ class TrajectoryDriver:
         rests = monitor.wait_for_rest(motion.targets, motion.stop_requested)
         return Outcome(monitor.positions(motion.targets), stalled and rests, text)
 
+    def _time_s(self, motion: Motion, monitor: JointMonitor) -> float:
+        """Returns the duration of a motion; the peaks of a cubic are 1.5 d/T (velocity) and 6 d/T^2 (acceleration)."""
+        starts, times_s = monitor.positions(motion.targets), [self._duration_s]
+        for name, target in motion.targets.items():
+            limits, distance = self._group.joint(name), abs(target - starts.get(name, target))
+            times_s += [1.5 * distance / limits.velocity, math.sqrt(6.0 * distance / limits.acceleration)]
+        return max(times_s)
 
-def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], duration_s: float) -> ManipulatorDriver:
+
+def make_driver(
+    controllers: list[dict[str, Any]], joints: Mapping[str, float], group: Group, duration_s: float
+) -> ManipulatorDriver:
     """Returns a driver of the controller that has all joints of a posture.
 
     Args:
         controllers: Entries of ``controller_list``: name, action_ns, type, joints.
         joints: Joints to move.
-        duration_s: Duration of a motion of a trajectory controller [s].
+        group: Planning group of the fingers.
+        duration_s: Shortest duration of a motion of a trajectory controller [s].
 
     Raises:
         GraspCommandError: No controller has all joints, or the controller type is unknown.
@@ -157,7 +176,7 @@ def make_driver(controllers: list[dict[str, Any]], joints: Mapping[str, float], 
                 case "GripperCommand":
                     return GripperDriver(action)
                 case "FollowJointTrajectory":
-                    return TrajectoryDriver(action, duration_s)
+                    return TrajectoryDriver(action, group, duration_s)
                 case other:
                     raise GraspCommandError(
                         f"controller '{entry.get('name')}' has the type '{other}'; allowed: "
@@ -191,11 +210,12 @@ class ControlledManipulator:
 
     Args:
         controllers: Entries of ``controller_list``: name, action_ns, type, joints.
-        duration_s: Duration of a motion of a trajectory controller [s].
+        group: Planning group of the fingers.
+        duration_s: Shortest duration of a motion of a trajectory controller [s].
     """
 
-    def __init__(self, controllers: list[dict[str, Any]], duration_s: float) -> None:
-        self._controllers, self._duration_s = controllers, duration_s
+    def __init__(self, controllers: list[dict[str, Any]], group: Group, duration_s: float) -> None:
+        self._controllers, self._group, self._duration_s = controllers, group, duration_s
         self._monitor = JointMonitor(queue_size=1)  # rest is detected after the end of the goal
         self._drivers: dict[tuple[str, ...], ManipulatorDriver] = {}
 
@@ -207,7 +227,7 @@ class ControlledManipulator:
         """Moves the joints through the controller that has all of them."""
         key = tuple(sorted(motion.targets))
         if key not in self._drivers:
-            self._drivers[key] = make_driver(self._controllers, motion.targets, self._duration_s)
+            self._drivers[key] = make_driver(self._controllers, motion.targets, self._group, self._duration_s)
         return self._drivers[key].move(motion, self._monitor)
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
