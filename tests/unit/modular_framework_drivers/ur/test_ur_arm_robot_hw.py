@@ -225,10 +225,13 @@ def test_a_fault_is_reported_the_arm_holds_and_comes_back_on_resume(rig: Rig, co
 
 
 def test_random_bytes_are_a_named_fault_or_endured_by_an_arm_that_follows(rig: Rig) -> None:
-    """The library behind the driver ends the connection, or connects again within the timeout."""
-    start = rig.positions
-    for step in range(250):
-        if step == 40:
+    """The library behind the driver ends the connection, connects again, or waits for the rest of a long package.
+
+    In the last case, commands still reach the arm until the timeout of the link.
+    """
+    start, sent_at = rig.positions, 40
+    for step in range(sent_at + round((LINK_TIMEOUT_S + 1.0) / PERIOD_S)):
+        if step == sent_at:
             rig.arm.command("garbage")
         goal = [position + 0.001 * step for position in start]
         rig.cycle(goal)
