@@ -79,9 +79,17 @@ def test_a_created_and_the_documented_planner_solve_problems_of_an_experiment(
         assert 0.0 < record.metrics["planner_method_time"] < record.metrics["planning_time"]
         assert record.metrics["planner_transport_time"] > 0.0 and record.metrics["path_length"] > 0.0
         assert "failure_class" not in record.snapshot
+        assert len(sources_of(record)) == 64
     for record in records["mine"]:  # a straight path, valid or in collision
         assert record.metrics["planner_method_time"] > 0.0
         assert record.succeeded or "fails the final validation" in record.cause
+    first, second = ({sources_of(record) for record in records[level]} for level in ("documented", "mine"))
+    assert len(first) == len(second) == 1 and first != second
+
+
+def sources_of(record: EpisodeRecord) -> str:
+    (planner,) = record.snapshot["planners"].values()
+    return str(planner["sources"])
 
 
 @pytest.mark.parametrize(

@@ -261,7 +261,7 @@ def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_p
 
 def test_a_report_warns_of_methods_whose_sources_are_unknown(tmp_path: Path) -> None:
     text = warnings(stored(tmp_path / "results.db", unknown_sources=["ws://127.0.0.1:8700"]))
-    assert "8 episodes ran with a method whose sources are unknown" in text and "ws://127.0.0.1:8700" in text
+    assert "8 episodes ran with a method or planner whose sources are unknown" in text and "ws://127.0.0.1:8700" in text
     assert warnings(stored(tmp_path / "known.db", unknown_sources=[])) == ""
 
 

@@ -94,6 +94,15 @@ def test_a_record_says_the_sources_of_an_external_method_and_which_are_unknown(t
     assert snapshot["unknown_sources"] == ("ws://127.0.0.1:8700",)
 
 
+def test_a_record_says_the_sources_of_a_planner_in_its_own_process_or_that_they_are_unknown(tmp_path: Path) -> None:
+    runs = [PlannerRun("external", name, {}, sources=sources) for name, sources in (("mine", "aa"), ("old", ""))]
+    ran = UsedSoftware().with_plans([*runs, PlannerRun("ompl", "PRM", {})])
+    snapshot = record_of(tmp_path, json.loads(json.dumps(asdict(ran)))).snapshot
+    sources = {name: planner.get("sources") for name, planner in snapshot["planners"].items()}
+    assert sources == {"mine of external": "aa", "old of external": None, "PRM of ompl": None}
+    assert snapshot["unknown_sources"] == ("old of external",)
+
+
 MESH = "<visual name='v'><geometry><mesh{}</mesh></geometry></visual>"
 
 

@@ -69,6 +69,8 @@ class PlannerRun:
         replaced: Requested planner_id that the pipeline does not have; otherwise empty.
         solver: Inverse kinematics solver of pose goals; empty without a pose goal.
         collision_checker: Class of the collision checker as `module/Class`.
+        sources: SHA-256 of the sources that the planner's own process has imported; empty if the process does not
+            report them, None for a planner without a process.
     """
 
     pipeline: str
@@ -79,6 +81,7 @@ class PlannerRun:
     replaced: str = ""
     solver: str = ""
     collision_checker: str = ""
+    sources: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,18 +19,21 @@ class UsedPlanner:
         settings: Resolved parameters.
         request_adapters: Request adapters, outermost first.
         implementations: Implementations that searched: `compiled`, `OMPL`, `CBiRRT`; empty for straight motions.
+        sources: SHA-256 of the sources in the planner's own process; empty if unknown, None without a process.
     """
 
     settings: Mapping[str, Any]
     request_adapters: tuple[str, ...]
     implementations: tuple[str, ...]
+    sources: str | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Returns the settings, extended by request adapters and implementations."""
+        """Returns the settings, extended by request adapters, implementations and known sources."""
         return {
             **self.settings,
             "request_adapters": ", ".join(self.request_adapters),
             IMPLEMENTATION: ", ".join(self.implementations),
+            **({"sources": self.sources} if self.sources else {}),
         }
 
 
@@ -51,7 +54,7 @@ class UsedSoftware:
         solver: Inverse kinematics methods; empty if no pose was solved.
         collision_checker: Classes of the collision checkers as `module/Class`; empty without a plan.
         methods: Grasp generation methods, keyed by package; methods with their own process also by command or address.
-        unknown_sources: Methods whose process does not report its sources.
+        unknown_sources: Methods and planners whose process does not report its sources.
         controllers: Types of the running controllers, keyed by name.
         physics_engine: Physics engine of the simulation.
         renderer: Renderer of the cameras; empty without cameras.
@@ -107,14 +110,16 @@ class UsedSoftware:
             name = f"{run.planner} of {run.pipeline}"
             before = planners[name].implementations if name in planners else ()
             searched = tuple(sorted({*before, run.implementation} - {""}))
-            planners[name] = UsedPlanner(run.settings, tuple(run.adapters), searched)
+            planners[name] = UsedPlanner(run.settings, tuple(run.adapters), searched, run.sources)
             if run.implementation == CONSTRAINED != run.planner:
                 substitutions.add(substitution_text(run.planner))
             if run.replaced:
                 replaced.add(f"planner '{run.replaced}' was named, and {run.planner} planned")
+        unknown = {name for name, planner in planners.items() if planner.sources == ""}
         return replace(
             self,
             planners=planners,
+            unknown_sources=tuple(sorted({*self.unknown_sources, *unknown})),
             solver=", ".join(sorted(solvers)),
             collision_checker=", ".join(sorted(checkers)),
             substitutions=tuple(sorted(substitutions)),

@@ -157,8 +157,8 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
     for methods, episodes in snapshots.get(UNKNOWN_SOURCES, ()):
         if methods:
             yield (
-                f"{count_phrase(episodes, 'episode')} ran with a method whose sources are unknown, so a change of the "
-                f"method is not noticed: {', '.join(methods)}. Update its package mbf_method."
+                f"{count_phrase(episodes, 'episode')} ran with a method or planner whose sources are unknown, so a "
+                f"change of it is not noticed: {', '.join(methods)}. Update its package mbf_method."
             )
     tries = [text for value, episodes in snapshots.get("earlier_tries", ()) for text in value * episodes]
     if tries:

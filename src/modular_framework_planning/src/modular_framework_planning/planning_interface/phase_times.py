@@ -56,6 +56,11 @@ class PhaseTimes:
         if self.run is not None and not self.run.implementation:
             self.run = replace(self.run, implementation=implementation)
 
+    def record_sources(self, sources: str) -> None:
+        """Records the SHA-256 of the sources in the planner's own process; empty if the process does not report it."""
+        if self.run is not None:
+            self.run = replace(self.run, sources=sources)
+
     def watch(self, checker: CollisionChecker) -> None:
         """Uses the past and future counts of a new checker, if it counts checks."""
         if isinstance(checker, CountsChecks):

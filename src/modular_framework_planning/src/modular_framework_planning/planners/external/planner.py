@@ -118,6 +118,7 @@ class ExternalPlanner(Planner):
     def _path(self, problem: PlanningProblem, goals: Array, waited_s: float) -> Array:
         request = path_request(problem, goals, self._urdf)
         self._client.start()
+        problem.phases.record_sources(self._client.sources)
         result = self._client.call(request, _remaining_s(problem), problem.cancelled)
         _record_times(problem, result.times, waited_s)
         return checked_path(result.message, request, self._max_points)
