@@ -40,6 +40,7 @@ from websockets.sync.client import connect
 from modular_framework_simulation.models.poses import Pose as SdfPose
 from modular_framework_simulation.models.sdf_specs import Box, Visual
 from modular_framework_simulation.sensors import scene_text
+from modular_framework_testing.chromium import Chromium
 from modular_framework_testing.ros_session import free_port, until
 
 URDF = """<robot name="arm"><link name="world"/>
@@ -442,6 +443,17 @@ def test_a_browser_that_has_not_drawn_a_frame_gets_panel_and_scene(box: Browser,
     move("box", (0.2, 0.3, 0.4))
     browser.follows("/world/box/link", (0.2, 0.3, 0.4))
     browser.close()
+
+
+def test_the_panel_stands_beside_the_scene_and_hides_nothing_of_it(launch: Any) -> None:
+    with Chromium(address_in(launch.log())) as browser:
+        ends = """(() => { const elements = [...document.querySelectorAll("*")];
+            const text = elements.findLast((element) => element.textContent.includes("real time factor"));
+            const scene = document.querySelector("canvas");
+            return [scene?.getBoundingClientRect().right, text?.getBoundingClientRect().left]; })()"""
+        until(lambda: all(browser.evaluate(ends)), "scene and panel", 60.0)
+        right_of_scene, left_of_text = browser.evaluate(ends)
+        assert 0.0 < right_of_scene <= left_of_text
 
 
 def test_a_reloaded_page_and_a_second_browser_show_the_present(launch: Any) -> None:

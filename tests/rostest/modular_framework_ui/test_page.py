@@ -21,10 +21,8 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from modular_framework_testing.chromium import Chromium
 from modular_framework_testing.ros_session import Launch, RosSession, free_port, until
-
-sys.path.insert(0, str(Path(__file__).parent))
-from chromium import Chromium  # noqa: E402
 
 STAY = """
 import rospy

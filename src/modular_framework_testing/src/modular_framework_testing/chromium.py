@@ -64,7 +64,13 @@ class Chromium:
         return str(self.evaluate(f"document.querySelector({json.dumps(selector)})?.textContent ?? ''"))
 
     def shows(self, selector: str, text: str, timeout_s: float = 60.0) -> None:
-        """Waits until an element contains a text."""
+        """Waits until an element contains a text.
+
+        Args:
+            selector: CSS selector of the element.
+            text: Text or part of the text.
+            timeout_s: Maximum wait [s].
+        """
         until(lambda: text in self.text(selector), f"{selector} shows '{text}'", timeout_s)
 
     def press(self, key: str) -> None:
