@@ -20,6 +20,7 @@ usage: ./install.sh [COMMAND]
   test [--repeat N] [SUITE]  set up, then run the tests: all (the default), full (with further robots and scenarios),
                        lint, unit, rostest, system or one suite
   shell                set up, then open a shell with everything sourced
+  doctor [ARG:=VALUE..]  check installation, configuration and running nodes; --report FILE writes what an issue needs
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
   site                 set up, then build the documentation as a web site, which any browser opens from the disk
   packages             only install the Debian packages and the Python environment
@@ -273,6 +274,18 @@ build_workspace() {
   printf '%s\n' "$fingerprint" >"$stamp"
 }
 
+# Without an installation, names what is missing and ends; an outdated build is only named.
+examine_build() {
+  local missing
+  missing=$(missing_debian_packages | tr '\n' ' ')
+  [ -z "$missing" ] || fail "Debian packages are missing: $missing" "./install.sh"
+  [ -x "$VENV/bin/python3" ] || fail "the Python environment is missing" "./install.sh"
+  [ -f "$ROOT/build/.fingerprint" ] || [ -f "$ROOT/build_install/.fingerprint" ] || fail "the workspace is not built" "./install.sh"
+  if [ "${INSTALL_SPACE:-0}" = 0 ] && [ "$(cat "$ROOT/build/.fingerprint")" != "$(build_fingerprint)" ]; then
+    say "The build is older than the files that it was made from. What to do: ./install.sh"
+  fi
+}
+
 run_catkin_build() {  # --install or --no-install
   cd "$ROOT"
   export PATH="$VENV/bin:$PATH" ROS_LANG_DISABLE=genlisp
@@ -380,6 +393,12 @@ main() {
       cd "$ROOT"
       exec "$VENV/bin/python3" tests/run "$@"
       ;;
+    doctor)
+      find_underlay
+      examine_build
+      source_workspace
+      exec rosrun modular_framework_api doctor "$@"
+      ;;
     exec)
       set_up
       source_workspace
@@ -401,7 +420,7 @@ main() {
     help | -h | --help) usage ;;
     *)
       usage >&2
-      fail "unknown command '$command'" "use one of: run, experiment, test, shell, exec, site, packages, help"
+      fail "unknown command '$command'" "use one of: run, experiment, test, doctor, shell, exec, site, packages, help"
       ;;
   esac
 }

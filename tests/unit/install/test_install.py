@@ -34,7 +34,7 @@ def test_refuses_an_unsupported_system_and_points_to_docker(tmp_path: Path, rele
 def test_refuses_an_unknown_command_and_lists_the_known_ones() -> None:
     answer = run_install("instal")
     assert answer.returncode == 1
-    assert "unknown command 'instal'" in answer.stderr and "run, experiment, test, shell" in answer.stderr
+    assert "unknown command 'instal'" in answer.stderr and "run, experiment, test, doctor, shell" in answer.stderr
 
 
 @pytest.mark.parametrize("folder", ["my checkout", "a:b", "price$", "it's"])
@@ -45,6 +45,20 @@ def test_refuses_a_path_that_cannot_be_built_in_before_anything_is_done(tmp_path
     assert answer.returncode == 1 and answer.stdout == ""
     assert f"the checkout is in '{tmp_path / folder}'" in answer.stderr and "move it to a path of" in answer.stderr
     assert [item.name for item in (tmp_path / folder).iterdir()] == ["install.sh"]
+
+
+@pytest.mark.parametrize(
+    ("packages", "missing"), [("bash\nno-such-package\n", "no-such-package"), ("bash\n", "the Python environment")]
+)
+def test_the_doctor_names_what_an_unfinished_installation_lacks_and_installs_nothing(
+    tmp_path: Path, packages: str, missing: str
+) -> None:
+    shutil.copy(ROOT / "install.sh", tmp_path)
+    (tmp_path / "packages-debian.txt").write_text(packages)
+    answer = subprocess.run([str(tmp_path / "install.sh"), "doctor"], capture_output=True, text=True, check=False)
+    assert answer.returncode == 1
+    assert missing in answer.stderr and "missing" in answer.stderr and "what to do: ./install.sh" in answer.stderr
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["install.sh", "packages-debian.txt"]
 
 
 def run_step(folder: Path, command: str, output: int) -> subprocess.Popen[bytes]:
