@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import ast
 import getpass
+import os
 import re
+import shutil
 import socket
+import subprocess
 from importlib import metadata
 from pathlib import Path
 
@@ -87,3 +90,23 @@ def test_the_faults_of_a_launch_are_findings_and_set_the_exit_code(
     assert "unknown argument 'planer_name'" in report.read_text() and "Python: " in report.read_text()
     assert ros_doctor.main([], lambda path, arguments: []) == 0
     assert ros_doctor.main([], lambda path, arguments: ["planner 'RRTConect' is unknown"]) == 1
+
+
+def test_the_faults_of_the_config_package_are_findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shipped = ROOT / "src/robots/ur5_ezgripper_moveit_config"
+    shutil.copytree(shipped, tmp_path / "lab_config")
+    for name, old, new in (
+        ("package.xml", "<name>ur5_ezgripper_moveit_config</name>", "<name>lab_config</name>"),
+        ("config/ur5_with_ezgripper.srdf", 'link1="wrist_1_link"', 'link1="wrist_9_link"'),
+    ):
+        file = tmp_path / "lab_config" / name
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new, 1))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}")
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{free_port()}")
+    command = ["rosrun", "modular_framework_api", "doctor"]
+    run = subprocess.run([*command, "moveit_config_package:=lab_config"], capture_output=True, text=True, check=False)
+    assert run.returncode == 1 and "FAULT  lab_config:" in run.stdout and "wrist_9_link" in run.stdout, run.stderr
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "the MoveIt config package have no fault" in run.stdout, run.stdout + run.stderr

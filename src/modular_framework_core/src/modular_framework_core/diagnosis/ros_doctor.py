@@ -35,12 +35,12 @@ DEFAULT_PACKAGE = "modular_framework_api"
 EXIT_FAULTS = 1
 
 
-def main(arguments: Sequence[str], launch_faults: Callable[[str, list[str]], Sequence[str]]) -> int:
+def main(arguments: Sequence[str], configuration_faults: Callable[[str, list[str]], Sequence[str]]) -> int:
     """Prints the findings; returns 1 if there is a fault.
 
     Args:
         arguments: Arguments of the command line.
-        launch_faults: Function that returns the faults of the names in a launch file and its arguments.
+        configuration_faults: Function that returns the faults of a launch file with its arguments.
     """
     parser = argparse.ArgumentParser(
         prog="doctor", description="Checks installation, configuration and running nodes; changes nothing."
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str], launch_faults: Callable[[str, list[str]], Seq
         ("Installation", installation_findings(checkout, Path(rospkg.get_ros_home()))),
         (
             f"Configuration: {' '.join([LAUNCH_FILE, 'of', package, *launch_arguments])}",
-            _configuration(package, launch_arguments, launch_faults),
+            _configuration(package, launch_arguments, configuration_faults),
         ),
         (f"Running system: ROS master {rosgraph.get_master_uri()}", _running_system()),
     ):
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str], launch_faults: Callable[[str, list[str]], Seq
 
 
 def _configuration(
-    package: str, arguments: list[str], launch_faults: Callable[[str, list[str]], Sequence[str]]
+    package: str, arguments: list[str], configuration_faults: Callable[[str, list[str]], Sequence[str]]
 ) -> Iterator[Finding]:
     """Yields the findings about a launch file, its arguments and its configuration files."""
     path = ""
@@ -81,15 +81,19 @@ def _configuration(
         path = roslaunch.rlutil.resolve_launch_arguments([package, LAUNCH_FILE])[0]
         check_arguments(path, arguments)
         with contextlib.redirect_stdout(io.StringIO()):  # the messages of xacro
-            faults = launch_faults(path, arguments)
+            faults = configuration_faults(path, arguments)
     except ArgumentError as error:
         faults = error.faults
     except (roslaunch.core.RLException, rospkg.ResourceNotFound) as error:
         faults = [load_error_text(error, path, arguments)]
     for text in faults:
-        yield fault(text.rstrip(".") + ".", "correct the name or value; the message lists what is allowed", "start")
+        yield fault(
+            text if text.endswith((".", "?")) else f"{text}.",
+            "correct the configuration; the message states what is allowed",
+            "start",
+        )
     if not faults:
-        yield ok("All names and values in the launch file, its arguments and its configuration files are known.")
+        yield ok("The launch file, its arguments, its configuration files and the MoveIt config package have no fault.")
 
 
 def _running_system() -> Iterator[Finding]:
