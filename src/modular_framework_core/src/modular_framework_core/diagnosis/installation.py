@@ -56,7 +56,7 @@ def computer_lines(checkout: Path | None) -> Iterator[str]:
     yield f"system: {platform.freedesktop_os_release().get('PRETTY_NAME', 'unknown')}, kernel {platform.release()}"
     yield f"processors: {os.cpu_count()} ({platform.machine()}), memory {psutil.virtual_memory().total / GB:.1f} GB"
     yield f"Python: {platform.python_version()}"
-    if checkout is not None:
+    if checkout is not None and shutil.which("git"):
         command = ["git", "-C", str(checkout), "describe", "--always", "--dirty"]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         yield f"commit: {run.stdout.strip() or 'unknown'}"
