@@ -20,8 +20,8 @@ import yaml
 from modular_framework_benchmark.commands.mode_runners import known_metrics
 from modular_framework_benchmark.experiments.design import design_text, plan_episodes
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
-from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
+from modular_framework_benchmark.launch_checks.ros_launch_check import LaunchCheck
 from modular_framework_core.launching.ros_launch_preview import preview_launch
 from modular_framework_testing.experiments.misspelt_names import (
     CASES,
@@ -316,7 +316,7 @@ def test_unchanged_hardware_and_controllers_are_in_order(tmp_path: Path) -> None
 
 def test_hardware_that_a_package_of_ones_own_exports_is_taken() -> None:
     script = """
-from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
+from modular_framework_benchmark.launch_checks.ros_launch_check import LaunchCheck
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
 node = LaunchedNode("modular_framework_control", "robot_hw", "/robot_hw", "/")
 for kind in ("my_arm/MyArm", "my_arm/MyArn"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import roslaunch.rlutil
 
-from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
+from modular_framework_benchmark.launch_checks.ros_launch_check import launch_faults
 
 
 def test_a_configuration_folder_of_the_original_names_nothing_unknown_but_its_planner() -> None:

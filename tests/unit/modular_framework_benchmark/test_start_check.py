@@ -12,7 +12,7 @@ import pytest
 import roslaunch.rlutil
 import rospkg
 
-from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
+from modular_framework_benchmark.launch_checks.ros_launch_check import launch_faults
 
 START = ("modular_framework_api", "start_framework.launch", "gui:=false", "rviz:=false")
 HARDWARE = """<launch>

@@ -12,7 +12,7 @@ from modular_framework_core.launching import ros_argument_check
 def name_faults(files: Sequence[str], arguments: list[str]) -> list[str]:
     """Returns all faults in the names of launch files, their arguments and their configuration files."""
     # the import takes 0.4 s, and only plain roslaunch needs it: run_framework has resolved the names
-    from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
+    from modular_framework_benchmark.launch_checks.ros_launch_check import launch_faults
 
     return launch_faults(files[0], arguments, files[1:])
 

@@ -18,9 +18,9 @@ from modular_framework_benchmark.experiments.kinematics_mode import KinematicsSe
 from modular_framework_benchmark.experiments.mode import CheckedSettings, ReadSettings, SettingFault
 from modular_framework_benchmark.experiments.planning_mode import PlanningSettings
 from modular_framework_benchmark.experiments.problem_sets import Problem
-from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
-from modular_framework_benchmark.experiments.ros_task_check import PLANNER_CONFIGS, has_framework_plugins
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.launch_checks.ros_launch_check import LaunchCheck
+from modular_framework_benchmark.launch_checks.ros_task_check import PLANNER_CONFIGS, has_framework_plugins
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_runner import (

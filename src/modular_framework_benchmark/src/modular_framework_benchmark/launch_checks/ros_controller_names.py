@@ -10,7 +10,7 @@ from typing import Any
 
 import rospkg
 
-from modular_framework_benchmark.experiments.ros_robot_names import RobotNames
+from modular_framework_benchmark.launch_checks.ros_robot_names import RobotNames
 from modular_framework_control.controller_manager.controller_parameters import parameter_faults
 from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
 from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex

@@ -13,7 +13,7 @@ from catkin.find_in_workspaces import find_in_workspaces
 from roslib.packages import find_node
 
 from modular_framework_benchmark.experiments.ros_resource_lookup import models_of_world
-from modular_framework_benchmark.experiments.ros_robot_names import RobotNames
+from modular_framework_benchmark.launch_checks.ros_robot_names import RobotNames
 from modular_framework_benchmark.predicates.conditions import REGIONS
 from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.launching.ros_declared_names import LaunchFault

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld
-from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
-from modular_framework_benchmark.experiments.ros_launch_files import (
+from modular_framework_benchmark.launch_checks.ros_controller_names import controller_faults, hardware_faults
+from modular_framework_benchmark.launch_checks.ros_launch_files import (
     ARGUMENTS,
     MOVE_GROUP,
     argument_faults,
@@ -22,7 +22,7 @@ from modular_framework_benchmark.experiments.ros_launch_files import (
     robot_model,
     sensor_faults,
 )
-from modular_framework_benchmark.experiments.ros_pipeline_names import (
+from modular_framework_benchmark.launch_checks.ros_pipeline_names import (
     DETECTOR,
     MANAGER,
     PipelineNames,
@@ -31,8 +31,8 @@ from modular_framework_benchmark.experiments.ros_pipeline_names import (
     resolved_names,
     unknown_name,
 )
-from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
-from modular_framework_benchmark.experiments.ros_task_check import (
+from modular_framework_benchmark.launch_checks.ros_robot_names import RobotNames, robot_names
+from modular_framework_benchmark.launch_checks.ros_task_check import (
     CacheableNames,
     CheckedTask,
     UnusedNames,
