@@ -27,10 +27,10 @@ from std_srvs.srv import SetBool, SetBoolResponse
 import smach
 from modular_framework_core import srv
 from modular_framework_core.commander.arm_commander import CommanderError
-from modular_framework_ros import ros_goal_senders
 from modular_framework_ros.action_client import is_connected
 from modular_framework_ros.action_server import SteadyActionServer
-from modular_framework_ros.ros_node_calls import NodeCallError
+from modular_framework_ros.connections import ros_goal_senders
+from modular_framework_ros.connections.ros_node_calls import NodeCallError
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.counter import Counter

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modular_framework_ros.camera_images import colour_array, depth_array
+from modular_framework_ros.messages.camera_images import colour_array, depth_array
 
 
 def image(encoding: str, data: bytes, *, step: int, width: int = 2, big: int = 0) -> SimpleNamespace:

@@ -13,7 +13,7 @@ from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSPub
 from std_msgs.msg import String
 
-from modular_framework_ros.ros_direct_publishing import DirectConnection
+from modular_framework_ros.connections.ros_direct_publishing import DirectConnection
 
 MESSAGES = [f"{number:06d}".encode() * 500 for number in range(400)]
 

@@ -15,7 +15,7 @@ import pytest
 from rosgraph.network import write_ros_handshake_header
 from rospy.impl import tcpros_base
 
-from modular_framework_ros.inbound_connections import BACKLOG, accept_connections_at_once
+from modular_framework_ros.connections.inbound_connections import BACKLOG, accept_connections_at_once
 
 
 class Node:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import PointCloud2, PointField
 
-from modular_framework_ros.point_clouds import PointCloudError, point_array
+from modular_framework_ros.messages.point_clouds import PointCloudError, point_array
 
 POINTS = np.array([[[0.1, 0.2, 0.3], [1.0, np.nan, 3.0]], [[-1.0, -2.0, -3.0], [4.0, 5.0, 6.0]]])
 

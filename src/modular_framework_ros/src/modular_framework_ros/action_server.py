@@ -15,8 +15,8 @@ from typing import Any
 import rospy
 from actionlib import ActionServer, SimpleActionServer
 
+from modular_framework_ros.connections.ros_goal_senders import GoalSenders
 from modular_framework_ros.publishing import going_down
-from modular_framework_ros.ros_goal_senders import GoalSenders
 
 MAX_STATUS_PAUSE_S = 2.0
 """Maximum pause of the status topic, longer than a single goal stays unreported [s]; reached only by rapid goals."""

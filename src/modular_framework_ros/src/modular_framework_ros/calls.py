@@ -19,7 +19,7 @@ from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 from modular_framework_ros.action_client import is_connected
-from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
+from modular_framework_ros.connections.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from modular_framework_ros.start_up import WaitReport, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
 

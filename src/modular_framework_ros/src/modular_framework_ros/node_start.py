@@ -24,9 +24,9 @@ def run_node(module: str, function: str = "main") -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     import rospy
 
-    from modular_framework_ros.inbound_connections import accept_connections_at_once
+    from modular_framework_ros.connections.inbound_connections import accept_connections_at_once
+    from modular_framework_ros.connections.ros_direct_publishing import publish_directly
     from modular_framework_ros.node_handle import ParameterError
-    from modular_framework_ros.ros_direct_publishing import publish_directly
 
     publish_directly()
     accept_connections_at_once()

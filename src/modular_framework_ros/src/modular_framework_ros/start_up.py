@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import rospy
 
+from modular_framework_ros.connections.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from modular_framework_ros.declared_parameters import DeclaredParameters
-from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 
 START_TIMEOUT_PARAMETER = "/start_timeout"
 REPORT_PERIOD_S = 10.0

@@ -10,7 +10,7 @@ import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import Constraints, MotionPlanRequest
 
-from modular_framework_ros.ros_goal_constraints import joint_goal, orientation_goal, position_goal
+from modular_framework_ros.messages.ros_goal_constraints import joint_goal, orientation_goal, position_goal
 from moveit_commander import conversions
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_joint_targets import GroupJointTargets, Target

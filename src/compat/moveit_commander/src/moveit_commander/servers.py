@@ -14,8 +14,8 @@ from rosgraph.names import ns_join
 
 from modular_framework_ros.action_client import SteadyActionClient, is_connected, unconnected_topics
 from modular_framework_ros.calls import CallError, call_service, wait_for_service, wait_until
-from modular_framework_ros.inbound_connections import accept_connections_at_once
-from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
+from modular_framework_ros.connections.inbound_connections import accept_connections_at_once
+from modular_framework_ros.connections.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from moveit_commander.exception import ServerError
 
 SERVICE_TIMEOUT_S = 5.0

@@ -11,7 +11,7 @@ from mbf_method.grasp_request import CameraView
 from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
 from modular_framework_core.grasp_generation.ros_fresh_messages import FreshMessages, NoMessageError
 from modular_framework_core.grasp_generation.ros_transforms import Transforms
-from modular_framework_ros.camera_images import colour_array, depth_array
+from modular_framework_ros.messages.camera_images import colour_array, depth_array
 
 DEPTH_PARAMETER, COLOUR_PARAMETER = "depth_image_topic_name", "rgb_image_topic_name"
 """Parameters of sensors_config.yaml with the topics of a camera."""

@@ -14,7 +14,7 @@ from sensor_msgs.msg import PointCloud2
 from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
 from modular_framework_core.grasp_generation.ros_fresh_messages import FreshMessages, NoMessageError
 from modular_framework_core.grasp_generation.ros_transforms import Transforms
-from modular_framework_ros.point_clouds import PointCloudError, point_array
+from modular_framework_ros.messages.point_clouds import PointCloudError, point_array
 
 Array = npt.NDArray[np.float64]
 

@@ -54,7 +54,7 @@ from modular_framework_core.task_runner.ros_episode import (
     generate_grasps,
 )
 from modular_framework_ros.calls import CallError, request_service, wait_until
-from modular_framework_ros.ros_frozen_nodes import frozen_nodes
+from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 from modular_framework_ros.stop_requests import stoppable
 

@@ -33,8 +33,8 @@ from modular_framework_benchmark.records.used_software import (
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun
+from modular_framework_ros.connections.ros_node_calls import NodeCallError, node_address, process_id
 from modular_framework_ros.reported_figures import SOURCES_PARAMETER
-from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
 FILE_PARAMETERS = {
     "task": "/task/task_constructor_script",

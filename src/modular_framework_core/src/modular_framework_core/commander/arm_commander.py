@@ -56,8 +56,8 @@ from modular_framework_ros.calls import (
     wait_for_service,
     wait_until,
 )
-from modular_framework_ros.ros_frozen_nodes import frozen_nodes
-from modular_framework_ros.ros_goal_constraints import joint_goal
+from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
+from modular_framework_ros.messages.ros_goal_constraints import joint_goal
 from modular_framework_ros.seeds import seed_parameter
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested

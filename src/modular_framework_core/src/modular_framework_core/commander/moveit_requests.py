@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from moveit_msgs.msg import Constraints, MoveItErrorCodes, RobotState
 from sensor_msgs.msg import JointState
 
-from modular_framework_ros.ros_goal_constraints import orientation_goal, position_goal
+from modular_framework_ros.messages.ros_goal_constraints import orientation_goal, position_goal
 
 JOINT_TOLERANCE_RAD = 1e-4
 POSITION_TOLERANCE_M = 1e-4

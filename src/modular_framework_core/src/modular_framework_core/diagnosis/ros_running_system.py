@@ -18,8 +18,8 @@ from sensor_msgs.msg import JointState
 
 from modular_framework_core.diagnosis.findings import Finding, fault, note, ok
 from modular_framework_ros.calls import CallError, is_advertised, request_service, wait_until
-from modular_framework_ros.ros_frozen_nodes import frozen_nodes
-from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
+from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
+from modular_framework_ros.connections.ros_node_calls import NodeCallError, node_address, process_id
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
 

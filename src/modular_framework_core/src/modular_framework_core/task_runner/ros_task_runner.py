@@ -57,9 +57,9 @@ from modular_framework_core.task_runner.task_runner import (
     write_record,
 )
 from modular_framework_ros.calls import CallError
+from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
-from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 

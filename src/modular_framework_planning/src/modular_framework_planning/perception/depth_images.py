@@ -10,7 +10,7 @@ import numpy as np
 
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_ros.point_clouds import PointCloudError, point_array
+from modular_framework_ros.messages.point_clouds import PointCloudError, point_array
 
 DEPTH_TYPES = {"16UC1": ("u2", 0.001), "32FC1": ("f4", 1.0), "mono16": ("u2", 0.001)}  # pixel type, unit [m]
 

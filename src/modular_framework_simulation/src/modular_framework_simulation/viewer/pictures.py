@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_ros.camera_images import colours, pixel_array
+from modular_framework_ros.messages.camera_images import colours, pixel_array
 
 _MAX_WIDTH_PX = 640
 

@@ -19,7 +19,7 @@ from typing import Any
 import rospy
 from rosgraph.network import encode_ros_handshake_header
 
-from modular_framework_ros.ros_node_calls import NodeCallError, node_address, published_bytes
+from modular_framework_ros.connections.ros_node_calls import NodeCallError, node_address, published_bytes
 
 CLIENT_TIMEOUT_S = 0.5
 """Maximum wait for a client whose node does not respond or does not count the goal [s]."""
