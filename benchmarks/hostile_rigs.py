@@ -30,11 +30,11 @@ from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardw
 from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.emulators.ur_emulator_process import EmulatedArm
 
 PERIOD_S = 0.008

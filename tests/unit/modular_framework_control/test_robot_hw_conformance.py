@@ -19,13 +19,13 @@ from modular_framework_control.hardware_interface.robot_hw_conformance import Ro
 from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
 from modular_framework_simulation.physics.engine_choice import MUJOCO, PYBULLET
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.robot_description import read_robot
 
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>

@@ -14,7 +14,6 @@ from modular_framework_simulation.loop.snapshots import take_snapshot
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort, LinkWrench
@@ -25,6 +24,7 @@ from modular_framework_simulation.physics.physics_engine import BASE_INDEX
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, JointSettings, Twist
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import exact_state, run, solid
 
 GRAVITY = 9.81

@@ -12,10 +12,10 @@ import pytest
 from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_simulation.sensors.force_torque import (
     ForceTorqueSensor,
     JointLoad,

@@ -16,7 +16,6 @@ from modular_framework_simulation.loop.simulation_loop import Hook, SimulationLo
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort, LinkWrench
@@ -34,6 +33,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import WORLD_FRAMES, PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, JointSettings, Twist, cross
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import lift_robot_urdf, solid
 
 NOWHERE = (0.0, 0.0, 0.0)

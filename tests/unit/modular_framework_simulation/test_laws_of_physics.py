@@ -14,12 +14,12 @@ from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.law_trials import TRIALS, heavy_on_light, stack
 from modular_framework_testing.simulation.simulated_samples import hinged_model, lift_robot_urdf, run, solid
 

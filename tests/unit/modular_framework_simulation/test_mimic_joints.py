@@ -10,10 +10,10 @@ import pytest
 
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.robots.robot_description import read_robot
 
 LINK = """<link name="{name}"><inertial><origin xyz="0.1 0 0"/><mass value="0.5"/>
   <inertia ixx="0.002" iyy="0.002" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>"""

@@ -13,7 +13,6 @@ from modular_framework_simulation.errors import DescriptionError, SimulationErro
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.body_joints import measured_joint
 from modular_framework_simulation.physics.engine_choice import ENGINES, MUJOCO
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX
@@ -21,6 +20,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import (
     exact_state,
     hinged_model,

@@ -16,13 +16,13 @@ from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import solid
 
 ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]

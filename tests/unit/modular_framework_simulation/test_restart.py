@@ -12,9 +12,9 @@ from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import exact_state, lift_robot_urdf, solid
 
 CUBE = solid("cube", specs.Box((0.05, 0.05, 0.05)), Pose((0.0, 0.0, 0.2)))

@@ -28,12 +28,12 @@ from modular_framework_simulation.loop.snapshots import take_snapshot
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
 from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody, Role
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import exact_state, lift_robot_urdf, solid
 
 Script = Callable[[float], None]

@@ -106,7 +106,7 @@ def _core_gripper(text: str, _folder: Path) -> None:
 
 def _simulated_robot(text: str, folder: Path) -> None:
     from modular_framework_simulation.models.mesh_files import ConvexParts
-    from modular_framework_simulation.models.robot_description import read_robot
+    from modular_framework_simulation.robots.robot_description import read_robot
 
     read_robot(text, str, ConvexParts(folder), False)
 

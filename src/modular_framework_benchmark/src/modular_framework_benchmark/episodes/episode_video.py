@@ -30,7 +30,6 @@ from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_model_text, read_world
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.body_urdf import model_to_urdf
@@ -38,6 +37,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_simulation.robots.robot_description import read_robot
 
 VIDEO = "video.mp4"
 FRAMES_PER_S = 10

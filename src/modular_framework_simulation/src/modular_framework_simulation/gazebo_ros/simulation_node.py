@@ -41,12 +41,12 @@ from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_world
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
 from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
 from modular_framework_simulation.sensors.visible_scene import SceneTracker

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import RobotDescription
-from modular_framework_simulation.models.robot_joint import RobotJoint, gripper_joints
 from modular_framework_simulation.models.sdf_specs import JointDynamics
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.physics_engine import JointState, Surface
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
+from modular_framework_simulation.robots.robot_description import RobotDescription
+from modular_framework_simulation.robots.robot_joint import RobotJoint, gripper_joints
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 _POSITION_GAIN = 0.2

@@ -28,8 +28,8 @@ from modular_framework_control.hardware_interface.joint_limits import (
 )
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle
-from modular_framework_simulation.models.robot_joint import RobotJoint
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.robots.robot_joint import RobotJoint
 
 _INTERFACES = {
     Mode.POSITION: PositionJointInterface,

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.robot_joint import RobotJoint
-from modular_framework_simulation.models.robot_masses import give_masses, give_rotors
 from modular_framework_simulation.models.sdf_specs import UNLIMITED_FRICTION, Mesh
+from modular_framework_simulation.robots.robot_joint import RobotJoint
+from modular_framework_simulation.robots.robot_masses import give_masses, give_rotors
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path

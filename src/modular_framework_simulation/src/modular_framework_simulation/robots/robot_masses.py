@@ -19,9 +19,9 @@ import numpy as np
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_joint import RobotJoint, gripper_joints
 from modular_framework_simulation.models.sdf_inertial import WATER_KG_PER_M3
 from modular_framework_simulation.models.solid_inertia import inertial_of_shapes
+from modular_framework_simulation.robots.robot_joint import RobotJoint, gripper_joints
 from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
