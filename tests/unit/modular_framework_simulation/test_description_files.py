@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.models.description_files import description_files, files_in_description
+from modular_framework_simulation.models.model_search import ros_resources
 from modular_framework_simulation.models.sdf_resources import Resources
 
 WORLD = """<sdf version='1.6'><world name='w'>

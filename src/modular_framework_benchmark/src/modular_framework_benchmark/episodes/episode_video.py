@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 from modular_framework_benchmark.episodes.errors import VideoError
 from modular_framework_benchmark.metrics.measurements import ObjectTrack
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, objects_of, read_joints, read_recording
-from modular_framework_benchmark.records.episode_settings import model_file
+from modular_framework_core.files.model_files import model_file
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.model_search import ros_resources
 from modular_framework_simulation.models.model_variants import read_scaled
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_model_text, read_world
-from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.body_urdf import model_to_urdf
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -73,7 +73,7 @@ class RecordedScene:
         self._joints, self._tracks = joints, objects_of(recording)
         self._parts = ConvexParts(default_cache_folder())
         models = str(parameters.get("gazebo_model_path", ""))
-        self._resources = Resources((Path(models),) if models else (), rospkg.RosPack().get_path)
+        self._resources = ros_resources(models)
         simulation = parameters.get("gazebo", {})
         self._build_world(str(simulation.get("world_file", "")))
         for name, model in recording.get("spawned", {}).items():

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.models.description_files import SDF_SUFFIXES, description_files, files_in_description
+from modular_framework_simulation.models.model_search import ros_resources
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_urdf.mesh_paths import PackageFinder
 

@@ -22,7 +22,6 @@ from modular_framework_benchmark.episodes.ros_file_digests import (
     world_files,
 )
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.records.episode_settings import model_file
 from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
@@ -30,6 +29,7 @@ from modular_framework_benchmark.records.used_software import (
     named_solvers,
     solver_substitutions,
 )
+from modular_framework_core.files.model_files import model_file
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun

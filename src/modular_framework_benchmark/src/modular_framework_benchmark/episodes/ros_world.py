@@ -16,8 +16,9 @@ from gazebo_msgs.srv import GetModelState, GetModelStateRequest, SetModelState, 
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerRequest
 
-from modular_framework_benchmark.records.episode_settings import PlacedObject, model_file
+from modular_framework_benchmark.records.episode_settings import PlacedObject
 from modular_framework_benchmark.records.perturbation import ObjectPerturbation
+from modular_framework_core.files.model_files import model_file
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_ros.calls import CallError, request_service
 from modular_framework_simulation.errors import DescriptionError

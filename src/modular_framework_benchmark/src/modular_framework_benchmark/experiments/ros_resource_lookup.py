@@ -23,7 +23,7 @@ from modular_framework_core.launching.launch_arguments import (
 from modular_framework_core.launching.launch_values import file_faults
 from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.gazebo_ros.model_search import ros_resources
+from modular_framework_simulation.models.model_search import ros_resources
 from modular_framework_simulation.models.sdf_reader import read_world
 
 

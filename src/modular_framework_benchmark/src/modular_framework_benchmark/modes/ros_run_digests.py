@@ -39,8 +39,9 @@ from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.ros_robots import load_robot
 from modular_framework_benchmark.records.episode import EpisodeSpec
-from modular_framework_benchmark.records.episode_settings import EpisodeSettings, model_file
+from modular_framework_benchmark.records.episode_settings import EpisodeSettings
 from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combination_key, digests_text
+from modular_framework_core.files.model_files import model_file
 from modular_framework_core.launching.ros_launch_preview import leaves
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
 

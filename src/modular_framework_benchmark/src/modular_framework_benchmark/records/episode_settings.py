@@ -164,17 +164,6 @@ SettingsT = TypeVar("SettingsT", bound=EpisodeSettings)
 _T = TypeVar("_T")
 
 
-def model_file(model: str, model_path: str) -> Path:
-    """Returns the SDF file of a placed object.
-
-    Args:
-        model: Name of a model, or absolute path of its file.
-        model_path: Folder of the models.
-    """
-    path = Path(model)
-    return path if path.is_absolute() else Path(model_path) / model / "model.sdf"
-
-
 def as_json(value: Any) -> Any:
     """Returns a value as JSON values; a dataclass becomes a mapping of its fields that are not None."""
     if is_dataclass(value):

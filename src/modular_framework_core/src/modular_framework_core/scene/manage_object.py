@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-MODEL_FILE = "model.sdf"
+from modular_framework_core.files.model_files import MODEL_FILE, model_file
+
 _NUMBERS = re.compile(r"[-+0-9.eE,\s]+")
 
 
@@ -138,8 +139,7 @@ def _model_file(object_type: str, model_path: str) -> Path:
             "parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
             "folder of the models, or give a file (-f)"
         )
-    files = [Path(folder) / object_type / MODEL_FILE for folder in model_path.split(":") if folder]
-    return next((file for file in files if file.is_file()), files[0])
+    return model_file(object_type, model_path)
 
 
 def _split_triplets(arguments: Sequence[str]) -> list[str]:

@@ -13,6 +13,7 @@ import yaml
 
 from modular_framework_core.files import default_folders, shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
+from modular_framework_core.files.model_files import MODEL_FILE
 from modular_framework_urdf.srdf_reader import read_srdf
 
 JOINT_STATES_FILE, TRAJECTORIES_FILE = "named_joint_states.yaml", "named_trajectories.yaml"
@@ -21,7 +22,6 @@ _FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "po
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
 PLANNER, MODEL, SERIES, OBJECT_TYPE = "planner", "model", "series", "object_type"
-MODEL_FILE = "model.sdf"
 MODEL_PATH = "/gazebo_model_path"
 """Parameter with the folders of models."""
 

@@ -22,7 +22,6 @@ from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
-from modular_framework_simulation.gazebo_ros.model_search import ros_resources
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
 from modular_framework_simulation.gazebo_ros.ros_names import RESTART
 from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, noise_seed
@@ -40,6 +39,7 @@ from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.model_search import ros_resources
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_world
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
