@@ -18,7 +18,7 @@ XACRO_TAGS = ("xacro:", "{http://www.ros.org/wiki/xacro", "{http://ros.org/wiki/
 Element = Any
 """An lxml element; `sourceline` is the first line of its start tag, from 1."""
 _MAX_LINE = 65_534
-"""Largest line number that lxml can set; beyond, `sourceline` is approximately the end of the tag."""
+"""Largest line number that lxml stores; for later lines, `sourceline` is approximately the end of the tag."""
 
 
 class XmlError(ValueError):

@@ -18,7 +18,7 @@ Mask = npt.NDArray[np.bool_]
 VOXEL_SIZE_M = 0.002
 """Edge length of the downsampling voxels; grasps need the surface at twice this resolution."""
 PLANE_TRIALS, PLANE_SAMPLES = 200, 3000
-"""Numbers of tested planes, and of points that score each plane."""
+"""Number of tested planes, and number of points that score each plane."""
 PLANE_TOLERANCE_M = 0.006
 MIN_VERTICAL_COSINE = math.cos(math.radians(10.0))
 """Minimum cosine between the support's normal and the vertical."""

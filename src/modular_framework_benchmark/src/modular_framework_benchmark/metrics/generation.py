@@ -16,7 +16,7 @@ def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
 def generation_time(episode: EpisodeMeasurements) -> float | None:
     """Real time from the request for grasps to the answer, measured from outside [s]; None without a grasp or request.
 
-    In the mode `grasps`, the time of the search alone.
+    In the mode `grasps`, the value is the time of the search alone.
     """
     first = _first(episode)
     return episode.generation_s if first is not None and first.succeeded else None
@@ -25,7 +25,7 @@ def generation_time(episode: EpisodeMeasurements) -> float | None:
 def method_processor_time(episode: EpisodeMeasurements) -> float | None:
     """Processor time of the method's processes, children included, until the end of the task [s].
 
-    In the mode `grasps`, the time of the search alone.
+    In the mode `grasps`, the value is the time of the search alone.
     """
     return episode.method_processor_s
 

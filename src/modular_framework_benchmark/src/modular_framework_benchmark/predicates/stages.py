@@ -49,7 +49,7 @@ class SimulatedStage:
 
 
 class OperatorStage:
-    """Stage of which an operator says what holds; implements `Stage`.
+    """Stage whose conditions an operator judges; implements `Stage`.
 
     Args:
         ask: Function that asks the operator whether a statement is true.

@@ -135,7 +135,7 @@ class RosControllerManager:
         return self.manager.moving
 
     def flush(self, timeout_s: float = 2.0) -> None:
-        """Waits up to `timeout_s` [s] until all messages passed on by the controllers so far are published."""
+        """Waits at most `timeout_s` [s] until all messages that the controllers have passed on are published."""
         self._outbox.flush(timeout_s)
 
     def close(self) -> None:

@@ -66,7 +66,8 @@ def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]
 def environment_of(process: Path) -> bytes:
     """Returns the environment of a process, entries separated by zero bytes.
 
-    Linux shows an empty environment while it loads the program of a new process, so an empty one is read again.
+    Linux shows an empty environment while it loads the program of a new process, so an empty environment is read
+    again.
 
     Args:
         process: Folder of the process in /proc.

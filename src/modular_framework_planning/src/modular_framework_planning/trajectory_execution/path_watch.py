@@ -48,7 +48,7 @@ class PathWatch:
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
         was_planned: bool = True,
     ) -> None:
-        """Stores the motion, sampled finely.
+        """Samples the motion finely and stores the samples.
 
         Args:
             joint_names: Moving joints of the robot.
@@ -106,7 +106,7 @@ class PathWatch:
         return None
 
     def other_joints_moved(self, positions: Array) -> bool:
-        """Checks whether a joint outside the motion has moved by more than CHECK_STEP since the last result True.
+        """Checks whether a joint outside the motion has moved by more than CHECK_STEP since the last True result.
 
         Args:
             positions: Positions of the whole robot [rad or m].

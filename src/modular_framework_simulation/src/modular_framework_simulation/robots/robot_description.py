@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads a robot's URDF for the simulation, and rewrites the URDF for the physics engine.
 
-In the rewritten URDF, convex hulls replace the collision meshes, and without a window the visual shapes are removed.
+In the rewritten URDF, convex hulls replace the collision meshes. Visual shapes are removed unless they are drawn.
 The engine then loads the robot and computes its contacts faster.
 """
 

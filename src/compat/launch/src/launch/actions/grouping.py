@@ -26,7 +26,7 @@ from launch.core.utilities import normalize_to_list_of_entities, perform_text
 
 
 class GroupAction(Action):
-    """Executes several actions on one condition and in one scope.
+    """Executes several actions under one condition and in one scope.
 
     Args:
         actions: The actions.

@@ -224,7 +224,7 @@ class SceneMonitor:
         """Waits, if simulated time is held, until objects and joints of the held time have arrived.
 
         Raises:
-            PlanningError: Timeout.
+            PlanningError: The state of the held time did not arrive within the timeout.
         """
         try:
             self.time.catch_up(lambda: self._latest)
