@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 import json
 import subprocess
@@ -80,10 +79,6 @@ class Chromium:
         names = {"key": key, "code": key, "windowsVirtualKeyCode": code}
         self._call("Input.dispatchKeyEvent", type="keyDown", **names, **text)
         self._call("Input.dispatchKeyEvent", type="keyUp", **names)
-
-    def save_picture(self, file: Path) -> None:
-        """Writes a picture of the page as PNG."""
-        file.write_bytes(base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"]))
 
     def close(self) -> None:
         """Ends the browser."""
