@@ -21,6 +21,7 @@ from modular_framework_ros.reported_figures import (
     ERROR_CODE,
     METHOD_FAULT,
     PLANNER_FAULT,
+    POLICY_FAULT,
     REACHABLE,
     Figure,
 )
@@ -79,6 +80,9 @@ def test_how_an_episode_ended_comes_first(status: EpisodeStatus, expected: Failu
         (report("generation", 2.0, False, {METHOD_FAULT: MethodFault.TOO_LARGE}), FailureClass.INVALID_OUTPUT),
         (report("planning", 2.0, False, {PLANNER_FAULT: MethodFault.DIED}), FailureClass.DIED),
         (report("planning", 2.0, False, {PLANNER_FAULT: MethodFault.RAISED}), FailureClass.INVALID_OUTPUT),
+        (report("policy", 2.0, False, {POLICY_FAULT: MethodFault.LATE}), FailureClass.DIED),
+        (report("policy", 2.0, False, {POLICY_FAULT: MethodFault.INVALID_RESULT}), FailureClass.INVALID_OUTPUT),
+        (report("policy", 2.0, succeeded=False), FailureClass.MOTION),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -31.0}), FailureClass.UNREACHABLE),
         (report("planning", 2.0, succeeded=False, figures={ERROR_CODE: -1.0}), FailureClass.NO_PLAN),
         (report("execution", 2.0, succeeded=False), FailureClass.MOTION),

@@ -67,6 +67,12 @@ PLANNER_METHOD_TIME, PLANNER_QUEUE_TIME, PLANNER_TRANSPORT_TIME, PLANNER_FAULT =
     replace(figure, component="planning") for figure in (METHOD_TIME, QUEUE_TIME, TRANSPORT_TIME, METHOD_FAULT)
 )
 """The same figures of a planner."""
+POLICY_METHOD_TIME, POLICY_QUEUE_TIME, POLICY_TRANSPORT_TIME, POLICY_FAULT = (
+    replace(figure, component="policy") for figure in (METHOD_TIME, QUEUE_TIME, TRANSPORT_TIME, METHOD_FAULT)
+)
+"""The same figures of a policy, summed over its queries."""
+POLICY_QUERIES = Figure("queries", "policy", "", "Queries that the policy answered.", source=Source.MEASURED)
+POLICY_ACTIONS = Figure("actions", "policy", "", "Actions that the arm executed.", source=Source.MEASURED)
 SOURCES_PARAMETER = "method_sources"
 """Private parameter with the digest of the sources of an external method, set by its node."""
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)

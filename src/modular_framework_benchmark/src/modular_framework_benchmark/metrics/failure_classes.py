@@ -14,14 +14,21 @@ from modular_framework_benchmark.predicates.conditions import Untouched
 from modular_framework_benchmark.predicates.predicate import Condition
 from modular_framework_benchmark.predicates.world_track import ROBOT, Floats, WorldTrack
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_ros.reported_figures import CANDIDATES, ERROR_CODE, METHOD_FAULT, PLANNER_FAULT, REACHABLE
+from modular_framework_ros.reported_figures import (
+    CANDIDATES,
+    ERROR_CODE,
+    METHOD_FAULT,
+    PLANNER_FAULT,
+    POLICY_FAULT,
+    REACHABLE,
+)
 
 SLIP_HEIGHT_M = 0.05
 """Height above its start up to which a lost object has slipped; from higher, it was dropped [m]."""
 RELEASE_S = 1.0
 """Time after the start of a gripper motion within which the loss of an object is its release [s]; the simulation
 notices a loss after 0.3 s."""
-AFTER_GENERATION = ("planning", "execution", "grasp")
+AFTER_GENERATION = ("planning", "execution", "grasp", "policy")
 """Components that a task uses once it has a grasp."""
 NO_IK_SOLUTION = -31
 """Error code of moveit_msgs/MoveItErrorCodes for a pose that the arm cannot reach."""
@@ -99,7 +106,7 @@ def _held_objects(world: WorldTrack | None) -> set[str]:
 
 
 def _of_component(report: ComponentReport, episode: EpisodeMeasurements) -> FailureClass:
-    fault = report.figures.get(METHOD_FAULT) or report.figures.get(PLANNER_FAULT)
+    fault = next(filter(None, map(report.figures.get, (METHOD_FAULT, PLANNER_FAULT, POLICY_FAULT))), None)
     if fault:
         return FailureClass.DIED if fault in _DEATHS else FailureClass.INVALID_OUTPUT
     if report.component == "generation":
