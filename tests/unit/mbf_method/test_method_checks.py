@@ -118,14 +118,17 @@ def test_a_wrong_unit_direction_or_order_of_a_path_is_named(sentence: str) -> No
     assert any(sentence in text for text in findings.faults), findings
 
 
-@pytest.mark.parametrize(("kind", "lines"), [("grasp", "12 grasps"), ("planner", "path of 2 points")])
+@pytest.mark.parametrize(
+    ("kind", "lines"), [("grasp", "12 grasps"), ("planner", "path of 2 points"), ("policy", "8 actions")]
+)
 def test_a_created_method_passes_its_test_and_check_method(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, lines: str
 ) -> None:
     assert create_main(["mine", "--kind", kind, "--into", str(tmp_path)]) == 0
     folder = tmp_path / "mine"
-    assert sorted(file.name for file in folder.iterdir()) == ["experiment.yaml", "mine.py", "test_mine.py"]
-    assert f'["{sys.executable}", "{folder}/mine.py"]' in (folder / "experiment.yaml").read_text()
+    use = "task.yaml" if kind == "policy" else "experiment.yaml"
+    assert sorted(file.name for file in folder.iterdir()) == sorted([use, "mine.py", "test_mine.py"])
+    assert f'["{sys.executable}", "{folder}/mine.py"]' in (folder / use).read_text()
     subprocess.run([*PYTHON, str(folder / "test_mine.py")], check=True, env={**os.environ, "PYTHONPATH": ""})
     assert check_main(["--kind", kind, "--", *PYTHON, str(folder / "mine.py")]) == 0
     printed = capsys.readouterr().out

@@ -16,8 +16,10 @@ from mbf_method.grasps import checked_grasps
 from mbf_method.wire import pack, unpack
 
 ROOT = Path(__file__).parents[3]
-EXAMPLE, PLANNER = (ROOT / f"docs/examples/{name}.py" for name in ("my_grasp_method", "my_planner"))
-MODULES = [EXAMPLE, PLANNER, *sorted((ROOT / "src/mbf_method/src/mbf_method").rglob("*.py"))]
+EXAMPLE, PLANNER, POLICY = (
+    ROOT / f"docs/examples/{name}.py" for name in ("my_grasp_method", "my_planner", "my_policy")
+)
+MODULES = [EXAMPLE, PLANNER, POLICY, *sorted((ROOT / "src/mbf_method/src/mbf_method").rglob("*.py"))]
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda path: path.name)
@@ -39,7 +41,7 @@ def test_a_module_runs_in_python_3_8_without_ros(module: Path) -> None:
     assert all(keyword.arg == "frozen" for call in decorators for keyword in call.keywords), "slots came in 3.10"
 
 
-@pytest.mark.parametrize("example", [EXAMPLE, PLANNER], ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", [EXAMPLE, PLANNER, POLICY], ids=lambda path: path.stem)
 def test_the_page_shows_the_example(example: Path) -> None:
     code = example.read_text().split("\n", 1)[1]  # without the licence
     assert f"```python\n{code}```" in (ROOT / "docs/own_method.md").read_text()

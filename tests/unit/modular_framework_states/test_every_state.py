@@ -12,19 +12,22 @@ from pathlib import Path
 
 import pytest
 
+from mbf_method.create_method import create_method
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_checks import declared_types
 from modular_framework_core.state_api.option_types import AnyOf, Anything, ListOf, MappingOf, OptionType, ScalarType
 from modular_framework_core.task_constructor.explanation import explain, option_meanings
 from modular_framework_core.task_constructor.loading import load_state_class
+from modular_framework_core.task_constructor.pipeline import main as check_task
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 
 ROOT = Path(__file__).parents[3]
 STATES = ROOT / "src" / "modular_framework_states" / "src" / "modular_framework_states" / "states"
 EXAMPLES = ROOT / "docs" / "examples"
+TEMPLATES = ROOT / "src/modular_framework_core/templates"
 CATALOGUE = StateCatalogue([STATES, EXAMPLES])
-METHODS = ("my_grasp_method", "my_planner")  # examples that are no states
+METHODS = ("my_grasp_method", "my_planner", "my_policy")  # examples that are no states
 NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_") and name not in METHODS]
 EXPECTED = {
     "wait_for_signal",
@@ -53,6 +56,7 @@ EXPECTED = {
     "set_planner",
     "log_metric",
     "release",
+    "run_policy",
 }
 
 
@@ -144,3 +148,16 @@ def test_the_state_to_begin_with_passes_its_own_test() -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout
+
+
+def test_the_task_of_a_created_policy_is_in_order_and_its_options_are_checked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    task = create_method("mine", "policy", tmp_path) / "task.yaml"
+    arguments = [str(task), str(STATES), str(TEMPLATES), "--check"]
+    assert check_task(arguments) == 0, capsys.readouterr().err
+    task.write_text(task.read_text().replace("rate: 20 ", "rate: 0 ").replace("actions: positions", "actions: poses"))
+    assert check_task(arguments) == 1
+    found = capsys.readouterr().err
+    assert "a number above 0" in found
+    assert "'positions', 'velocities', 'deltas'" in found

@@ -10,14 +10,15 @@ from typing import Any, Sequence
 
 from mbf_method.errors import MethodError
 from mbf_method.grasp_request import GraspRequest
-from mbf_method.method_checks import Findings, check_grasp_method, check_planner
+from mbf_method.method_checks import Findings, check_grasp_method, check_planner, check_policy
 from mbf_method.method_client import MethodClient, MethodLimits, MethodSource
+from mbf_method.observation import Observation
 from mbf_method.path_request import PathRequest
-from mbf_method.sample_inputs import grasp_requests, path_requests
-from mbf_method.served_method import GRASPS, PATHS
+from mbf_method.sample_inputs import grasp_requests, observations, path_requests
+from mbf_method.served_method import ACTIONS, GRASPS, PATHS
 from mbf_method.wire import unpack
 
-KINDS = {"grasp": GRASPS, "planner": PATHS}
+KINDS = {"grasp": GRASPS, "planner": PATHS, "policy": ACTIONS}
 
 
 def check(kind: str, client: MethodClient, folder: Path | None) -> Findings:
@@ -41,6 +42,9 @@ def check(kind: str, client: MethodClient, folder: Path | None) -> Findings:
         requests = grasp_requests(client.needs_camera)
         recorded = None if folder is None else [GraspRequest.from_message(item) for item in _messages(folder)]
         return check_grasp_method(call, requests if recorded is None else recorded)
+    if kind == "policy":
+        inputs = observations() if folder is None else [Observation.from_message(item) for item in _messages(folder)]
+        return check_policy(call, inputs)
     paths = path_requests() if folder is None else [PathRequest.from_message(item) for item in _messages(folder)]
     return check_planner(call, paths)
 

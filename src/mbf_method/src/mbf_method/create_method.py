@@ -62,17 +62,43 @@ trials: 20                           # problems and seeds, equal for both planne
 seed: 1
 time_limit: 60                       # time limit of an episode [s]
 """
-EXPERIMENTS = {"grasp": GRASP_EXPERIMENT, "planner": PLANNER_EXPERIMENT}
+POLICY_TASK = """\
+# Lets NAME drive a simulated Panda to the joint positions of its goal. In a shell of ./install.sh shell:
+#
+#   roslaunch panda_hand_robot start_framework.launch task_constructor_script:=FOLDER/task.yaml
+
+name: NAME_task
+source: framework_state_machine
+node_name: NAME_task
+outcomes: [done, failed]
+states:
+  - RunPolicy:
+      source: run_policy
+      command: [COMMAND]
+      actions: positions             # or velocities, or deltas
+      rate: 20                       # actions per second
+      horizon: 20                    # actions in a chunk
+      chunk: 10                      # actions that run before the next query
+      max_duration: 60               # [s]
+      must_finish: true
+      transitions: {success: done, fail: failed}
+"""
+FILES = {
+    "grasp": ("experiment.yaml", GRASP_EXPERIMENT),
+    "planner": ("experiment.yaml", PLANNER_EXPERIMENT),
+    "policy": ("task.yaml", POLICY_TASK),
+}
+"""Name and content of the file that runs a method in the framework, by kind of method."""
 
 
 def create_method(name: str, kind: str, parent: Path) -> Path:
-    """Creates a folder with a method, a test and an experiment, and returns the folder.
+    """Creates a folder with a method, a test and an experiment or task, and returns the folder.
 
-    The experiment runs the method with the interpreter of this process.
+    The experiment or task runs the method with the interpreter of this process.
 
     Args:
         name: Name of the method, a Python identifier.
-        kind: Key of `EXPERIMENTS`.
+        kind: Key of `FILES`.
         parent: Folder of the new folder.
 
     Raises:
@@ -89,8 +115,9 @@ def create_method(name: str, kind: str, parent: Path) -> Path:
         text = (TEMPLATES / template).read_text(encoding="utf-8").split("\n", 1)[1]  # without the licence
         (folder / file).write_text(text.replace(TEMPLATE_NAME, name), encoding="utf-8")
     command = ", ".join(f'"{part}"' for part in (sys.executable, folder / f"{name}.py"))
-    experiment = EXPERIMENTS[kind].replace("NAME", name).replace("COMMAND", command)
-    (folder / "experiment.yaml").write_text(experiment, encoding="utf-8")
+    file, text = FILES[kind]
+    text = text.replace("NAME", name).replace("COMMAND", command).replace("FOLDER", str(folder))
+    (folder / file).write_text(text, encoding="utf-8")
     return folder
 
 
@@ -98,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns 0 on success, otherwise 1."""
     parser = argparse.ArgumentParser(prog="create_method", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("name", metavar="NAME", help="name of the method, a Python identifier")
-    parser.add_argument("--kind", choices=sorted(EXPERIMENTS), required=True, help="kind of the method")
+    parser.add_argument("--kind", choices=sorted(FILES), required=True, help="kind of the method")
     parser.add_argument("--into", type=Path, default=Path(), metavar="FOLDER", help="parent folder; default: here")
     options = parser.parse_args(arguments)
     try:
@@ -107,12 +134,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"create_method: {error}", file=sys.stderr)
         return 1
     method = folder / f"{options.name}.py"
-    print(f"created {method}, test_{options.name}.py and experiment.yaml; next:")
+    file = folder / FILES[options.kind][0]
+    print(f"created {method}, test_{options.name}.py and {file.name}; next:")
     print(f"  {sys.executable} -m mbf_method.check_method --kind {options.kind} -- {sys.executable} {method}")
     if options.kind == "planner":
         problems = f"panda_hand_moveit_config panda_arm {folder / 'problems'} --count 20"
         print(f"  rosrun modular_framework_benchmark make_problems {problems}")
-    print(f"  rosrun modular_framework_benchmark run_experiment {folder / 'experiment.yaml'}")
+    if options.kind == "policy":
+        print(f"  roslaunch panda_hand_robot start_framework.launch task_constructor_script:={file}")
+    else:
+        print(f"  rosrun modular_framework_benchmark run_experiment {file}")
     return 0
 
 

@@ -8,15 +8,17 @@ seed without effect. They know neither the reach of a robot nor its collisions, 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
+from mbf_method.actions import checked_actions, limited_targets
 from mbf_method.errors import InvalidOutputError, MethodError
 from mbf_method.grasp_request import GraspRequest
 from mbf_method.grasps import Grasps, checked_grasps
 from mbf_method.joint_path import END_TOLERANCE, checked_path
+from mbf_method.observation import ACTION_KINDS, GRIPPER_COLUMN, Observation
 from mbf_method.path_request import PathRequest
 from mbf_method.served_method import ServedMethod
 from mbf_method.wire import pack, unpack
@@ -113,6 +115,33 @@ def check_planner(call: Call, requests: Sequence[PathRequest]) -> Findings:
         notes.append(f"{name}: path of {len(path)} points." if len(path) else f"{name}: no path.")
     if not solved and not faults:
         faults.append("the planner found no path for any input.")
+    return Findings(tuple(faults), tuple(notes))
+
+
+def check_policy(call: Call, inputs: Sequence[Observation]) -> Findings:
+    """Checks a policy.
+
+    Args:
+        call: Function that calls the policy.
+        inputs: Observations.
+    """
+    faults: list[str] = []
+    notes: list[str] = []
+    acted = 0
+    for number, observation in enumerate(inputs, start=1):
+        name = f"input {number}"
+        try:
+            actions = checked_actions(_repeated(call, observation, name, faults, notes), observation.actions)
+        except MethodError as error:
+            faults.append(f"{name}: {error}.")
+            continue
+        acted += bool(len(actions))
+        notes.append(f"{name}: {len(actions)} actions." if len(actions) else f"{name}: the task is done.")
+        targets = limited_targets(actions, observation.actions, _start(observation))
+        if targets.fault:
+            faults.append(f"{name}: {targets.fault}{_action_hint(actions, observation)}.")
+    if not acted and not faults:
+        faults.append("the policy returned no action for any input.")
     return Findings(tuple(faults), tuple(notes))
 
 
@@ -269,3 +298,24 @@ def _path_hint(positions: Any, request: PathRequest) -> str:
 
 def _near(first: np.ndarray, second: np.ndarray) -> bool:
     return bool(np.abs(first - second).max() <= END_TOLERANCE)
+
+
+def _start(observation: Observation) -> np.ndarray:
+    """Returns the positions of all columns of the actions."""
+    has_gripper = observation.actions.names[-1] == GRIPPER_COLUMN
+    return np.append(observation.robot.positions, [observation.gripper] if has_gripper else [])
+
+
+def _action_hint(actions: np.ndarray, observation: Observation) -> str:
+    """Returns the likely reason why actions exceed the limits; "" for none."""
+    spec, joints = observation.actions, len(observation.actions.joint_names)
+    in_radians = actions.copy()
+    in_radians[:, :joints] = np.radians(in_radians[:, :joints])
+    if not limited_targets(in_radians, spec, _start(observation)).fault:
+        return "; the joint columns seem to be in degrees, they must be in radians"
+    suitable = [
+        kind
+        for kind in ACTION_KINDS
+        if not limited_targets(actions, replace(spec, kind=kind), _start(observation)).fault
+    ]
+    return f"; the actions seem to be {' or '.join(suitable)}, they must be {spec.kind}" if suitable else ""

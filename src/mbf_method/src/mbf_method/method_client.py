@@ -29,7 +29,8 @@ from mbf_method.errors import (
     TooLargeError,
 )
 from mbf_method.method_process import MethodProcess
-from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
+from mbf_method.openpi import openpi_response
+from mbf_method.wire import OPENPI, PROTOCOL, VERSION, pack, unpack
 
 LOGGER = logging.getLogger("mbf_method")
 RETRY_PERIOD_S = 0.05
@@ -46,11 +47,13 @@ class MethodSource:
         command: Program and arguments that start the method.
         address: Address of a running method, such as ws://127.0.0.1:8700.
         record_folder: Folder for copies of all requests, as inputs of `check_method`; "" for no copies.
+        protocol: `mbf_method`, or `openpi` for a policy server at an address.
     """
 
     command: tuple[str, ...] = ()
     address: str = ""
     record_folder: str = ""
+    protocol: str = PROTOCOL
 
 
 @dataclass(frozen=True)
@@ -160,12 +163,16 @@ class MethodClient:
             _record(encoded, Path(self._source.record_folder))
         data = self._exchange(encoded, self._limits.call_s if limit_s is None else limit_s, is_cancelled)
         if isinstance(data, str):
+            if self._source.protocol == OPENPI:
+                self.close()  # the server closes the connection after the text
             raise MethodRaisedError(
                 f"the function of the method raised {data.strip().splitlines()[-1]}; its log has the traceback"
             )
         message = unpack(data)
         total_s = time.perf_counter() - started_s
         try:
+            if self._source.protocol == OPENPI:
+                message = openpi_response(message, total_s)
             timing = message["server_timing"]
             method_s, queue_s = (1e-3 * float(timing[name]) for name in ("infer_ms", "queue_ms"))
             processor_s = 1e-3 * float(timing.get("processor_ms", 0.0))
@@ -223,6 +230,12 @@ class MethodClient:
 
     def _check_greeting(self, address: str, data: Any) -> None:
         greeting = unpack(data) if isinstance(data, bytes) else {}
+        if self._source.protocol == OPENPI:
+            if not isinstance(data, bytes) or greeting.get("protocol") == PROTOCOL:
+                raise MethodVersionError(
+                    f"the server at {address} is no openpi server; for a method of mbf_method, leave out openpi_keys"
+                )
+            return
         found = [greeting.get(name) for name in ("protocol", "version", "kind")]
         if found != [PROTOCOL, VERSION, self._kind]:
             raise MethodVersionError(

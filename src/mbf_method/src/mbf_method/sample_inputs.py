@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inputs of methods for checks without the framework: objects on a table, and motions of a planar arm."""
+"""Inputs of methods for checks without the framework: objects on a table, motions and observations of a planar arm."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbf_method.grasp_request import CameraView, GraspRequest, Gripper, RobotState, SceneObject
+from mbf_method.observation import GRIPPER_COLUMN, ActionSpec, CameraImages, Observation
 from mbf_method.path_request import Obstacle, PathRequest
 
 GRIPPER = Gripper(max_opening=0.1, pad_width=0.02, pad_height=0.03, fingertip=0.02)
@@ -28,6 +29,7 @@ IMAGE_HEIGHT, IMAGE_WIDTH, FOCAL_LENGTH = 240, 320, 300.0
 ARM_JOINTS = ("joint_1", "joint_2", "joint_3")
 LINK_LENGTH_M = 0.3
 START, GOAL = (-1.2, 0.3, 0.3), (1.2, -0.3, -0.3)
+POLICY_RATE_HZ, HORIZON = 10.0, 8
 
 
 def grasp_requests(camera: bool = False) -> list[GraspRequest]:
@@ -55,6 +57,27 @@ def path_requests() -> list[PathRequest]:
     )
     goals = np.array([GOAL, (0.8, -0.9, 0.4)])
     return [free, replace(free, obstacles=(box,), seed=2), replace(free, goals=goals, seed=3)]
+
+
+def observations() -> list[Observation]:
+    """Returns observations of a planar arm with a gripper and a camera in two states."""
+    box = _box("box", (0.04, 0.07, 0.1), (0.4, 0.1), 0.0)
+    view = _view_from_above(box)
+    gripper = ([0.0], [1.0], [np.inf])
+    lower, upper, velocity = (np.append(np.full(3, limit), end) for limit, end in zip((-2.5, 2.5, 2.0), gripper))
+    spec = ActionSpec("positions", (*ARM_JOINTS, GRIPPER_COLUMN), HORIZON, POLICY_RATE_HZ, lower, upper, velocity)
+    first = Observation(
+        robot=RobotState(ARM_JOINTS, np.array(START)),
+        gripper=0.0,
+        cameras={"top": CameraImages(view.colour, view.depth)},
+        prompt="pick up the box",
+        time_s=0.0,
+        step=0,
+        actions=spec,
+        seed=1,
+    )
+    later = RobotState(ARM_JOINTS, np.zeros(3))
+    return [first, replace(first, robot=later, gripper=0.5, time_s=0.8, step=HORIZON)]
 
 
 def _box(name: str, size: tuple[float, ...], place: tuple[float, float], yaw: float) -> SceneObject:

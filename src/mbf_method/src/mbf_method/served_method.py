@@ -14,9 +14,11 @@ from typing import Any, Callable, Mapping, overload
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
+from mbf_method.actions import Actions
 from mbf_method.grasp_request import GraspRequest
 from mbf_method.grasps import Grasps
 from mbf_method.joint_path import JointPath
+from mbf_method.observation import Observation
 from mbf_method.path_request import PathRequest
 from mbf_method.source_digest import source_digest
 from mbf_method.wire import PROTOCOL, VERSION, pack, unpack
@@ -26,7 +28,7 @@ PORT_VARIABLE = "MBF_METHOD_PORT"
 DEFAULT_PORT = 8700
 MAX_REQUEST_BYTES = 1 << 28
 PARENT_PERIOD_S = 1.0
-GRASPS, PATHS = "grasps", "paths"
+GRASPS, PATHS, ACTIONS = "grasps", "paths", "actions"
 """Kinds of methods."""
 
 GraspFunction = Callable[[GraspRequest], Grasps]
@@ -119,6 +121,11 @@ def grasp_method(
 def planner(function: Callable[[PathRequest], JointPath]) -> ServedMethod:
     """Decorates a function that returns a path to a goal; `ServedMethod.serve` serves the function."""
     return ServedMethod(function, PATHS, PathRequest.from_message, JointPath)
+
+
+def policy(function: Callable[[Observation], Actions]) -> ServedMethod:
+    """Decorates a function that returns a chunk of actions; `ServedMethod.serve` serves the function."""
+    return ServedMethod(function, ACTIONS, Observation.from_message, Actions)
 
 
 class _Handler:

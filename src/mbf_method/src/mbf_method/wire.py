@@ -12,6 +12,8 @@ import numpy as np
 from mbf_method.errors import InvalidOutputError
 
 PROTOCOL = "mbf_method"
+OPENPI = "openpi"
+"""Protocol of policy servers that send metadata first and do not state a version."""
 VERSION = 1
 """Version of the messages; method and framework must have the same version."""
 REFUSED_KINDS = "VOc"

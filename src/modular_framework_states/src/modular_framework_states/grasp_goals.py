@@ -40,6 +40,26 @@ def send(
     Raises:
         GraspGoalError: The task has no manipulator or server, the stage was not reached, or a stop was requested.
     """
+    start_stage(client, stage, grasp, max_torque)
+    status = wait_for_result(client, timeout_s, stop_requested)
+    result = client.get_result()
+    if status == SUCCEEDED and result is not None and getattr(result, _RESULT_FLAGS[stage]).data:
+        return
+    raise GraspGoalError(client.get_goal_status_text() or f"the server returned status {status} without a reason")
+
+
+def start_stage(client: Any, stage: Stage, grasp: Any, max_torque: float) -> None:
+    """Sends a grasp stage without waiting for its end.
+
+    Args:
+        client: Client of the manipulator's action server; None if the task has no manipulator.
+        stage: Stage of the grasp.
+        grasp: Grasp message.
+        max_torque: Fraction of the maximum torque.
+
+    Raises:
+        GraspGoalError: The task has no manipulator or server.
+    """
     if client is None:
         raise GraspGoalError("the task has no manipulator; set manipulator_prefix to drive one")
     try:
@@ -48,8 +68,3 @@ def send(
         raise GraspGoalError(str(error)) from error
     command = GraspCommand(grasp_state=_NUMBERS[stage], grasp=grasp, max_torque=float(max_torque))
     client.send_goal(GraspGoal(grasp_command=command))
-    status = wait_for_result(client, timeout_s, stop_requested)
-    result = client.get_result()
-    if status == SUCCEEDED and result is not None and getattr(result, _RESULT_FLAGS[stage]).data:
-        return
-    raise GraspGoalError(client.get_goal_status_text() or f"the server returned status {status} without a reason")

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Output of a policy, and the checks of this output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Mapping
+
+import numpy as np
+
+from mbf_method.errors import InvalidOutputError
+from mbf_method.observation import GRIPPER_COLUMN, ActionSpec, Observation
+
+LIMIT_TOLERANCE = 1e-3
+"""Maximum excess of a target beyond a limit, which is clipped [rad or m]; single precision needs 1e-6."""
+
+
+@dataclass(frozen=True)
+class Actions:
+    """Chunk of actions.
+
+    Attributes:
+        actions: Actions at the rate of the observation's `ActionSpec`, shape (horizon, a). The joint columns are target
+            positions [rad or m], velocities [rad/s or m/s], or differences from the previous target [rad or m]. The
+            gripper column is a fraction, from 0 (open) to 1 (closed). No action means that the task is done.
+    """
+
+    actions: np.ndarray
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Targets of a chunk within the limits.
+
+    Attributes:
+        values: Target positions of the columns after each action, shape (n, a) [rad or m; fraction for the gripper].
+        fault: First target that exceeded a limit, as text; "" if all targets respect the limits.
+    """
+
+    values: np.ndarray
+    fault: str
+
+
+def task_done(observation: Observation) -> Actions:
+    """Returns the result of a policy that has completed its task."""
+    return Actions(np.zeros((0, len(observation.actions.names))))
+
+
+def checked_actions(message: Mapping[str, Any], spec: ActionSpec) -> np.ndarray:
+    """Checks a result and returns its actions, shape (horizon, a); shape (0, a) if the task is done.
+
+    Args:
+        message: Fields of `Actions`, keyed by name.
+        spec: Required actions.
+
+    Raises:
+        InvalidOutputError: A field name, shape or value is invalid.
+    """
+    if list(message) != ["actions"]:
+        raise InvalidOutputError(f"the result has the fields {sorted(message)}; it must have ['actions']")
+    actions, columns = message["actions"], len(spec.names)
+    required = f"it must be an array of numbers of shape ({spec.horizon}, {columns}): {', '.join(spec.names)}"
+    if not isinstance(actions, np.ndarray):
+        raise InvalidOutputError(f"actions is a {type(actions).__name__}; {required}")
+    if actions.dtype.kind not in "fiu" or actions.shape not in ((spec.horizon, columns), (0, columns)):
+        raise InvalidOutputError(f"actions has shape {actions.shape} and type {actions.dtype}; {required}")
+    finite = np.isfinite(actions)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise InvalidOutputError(f"actions[{row}] has a {spec.names[column]} that is not finite")
+    return actions.astype(np.float64)
+
+
+def limited_targets(actions: np.ndarray, spec: ActionSpec, start: np.ndarray) -> Targets:
+    """Converts actions to target positions within the position and velocity limits.
+
+    Args:
+        actions: Checked actions, shape (n, a).
+        spec: Required actions.
+        start: Target before the first action, shape (a,).
+    """
+    values, fault, previous = np.zeros(actions.shape), "", start
+    reach = spec.max_velocity / spec.rate_hz
+    for index, action in enumerate(actions):
+        wanted = _target(action, spec, previous)
+        reachable = np.clip(wanted, previous - reach, previous + reach)
+        values[index] = np.clip(reachable, spec.lower, spec.upper)
+        excess = np.abs(wanted - values[index])
+        if not fault and excess.max() > LIMIT_TOLERANCE:
+            worst = int(np.argmax(excess))
+            fault = _fault_text(index, worst, spec, (previous[worst], wanted[worst]))
+        previous = values[index]
+    return Targets(values, fault)
+
+
+def _target(action: np.ndarray, spec: ActionSpec, previous: np.ndarray) -> np.ndarray:
+    if spec.kind == "positions":
+        return action
+    target = previous + (action / spec.rate_hz if spec.kind == "velocities" else action)
+    if spec.names[-1] == GRIPPER_COLUMN:
+        target[-1] = action[-1]
+    return target
+
+
+def _fault_text(index: int, column: int, spec: ActionSpec, motion: tuple[float, float]) -> str:
+    """Returns which limit a motion of a column, given as start and target, exceeds."""
+    start, target = motion
+    name, lower, upper = spec.names[column], spec.lower[column], spec.upper[column]
+    if not lower - LIMIT_TOLERANCE <= target <= upper + LIMIT_TOLERANCE:
+        return f"actions[{index}] moves {name} to {target:.4f}; it must be from {lower:.4f} to {upper:.4f}"
+    velocity = abs(target - start) * spec.rate_hz
+    return (
+        f"actions[{index}] moves {name} from {start:.4f} to {target:.4f} at {velocity:.4f} per s; the maximum velocity "
+        f"is {spec.max_velocity[column]:.4f} per s"
+    )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Input of a policy: camera images, robot state, prompt and the required actions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Mapping
+
+import numpy as np
+
+from mbf_method.grasp_request import RobotState
+
+ACTION_KINDS = ("positions", "velocities", "deltas")
+"""Kinds of actions: joint positions, joint velocities, differences between successive joint positions."""
+GRIPPER_COLUMN = "gripper"
+"""Name of the last column of actions with a gripper."""
+
+
+@dataclass(frozen=True)
+class CameraImages:
+    """Latest images of a camera.
+
+    Attributes:
+        colour: RGB colours, shape (h, w, 3), uint8; shape (0, 0, 3) without a colour image.
+        depth: Depths along the optical axis, shape (h, w) [m]; NaN for pixels without a measurement, shape (0, 0)
+            without a depth image.
+    """
+
+    colour: np.ndarray
+    depth: np.ndarray
+
+
+@dataclass(frozen=True)
+class ActionSpec:
+    """Required actions.
+
+    Attributes:
+        kind: Meaning of the joint columns, one of `ACTION_KINDS`.
+        names: Names of the columns: the joints, then `GRIPPER_COLUMN` if the policy drives the gripper.
+        horizon: Number of actions of a chunk.
+        rate_hz: Number of actions per second.
+        lower: Lower limits of the target positions, shape (a,) [rad or m]; 0 for the gripper.
+        upper: Upper limits of the target positions, shape (a,) [rad or m]; 1 for the gripper.
+        max_velocity: Velocity limits, shape (a,) [rad/s or m/s]; infinite for the gripper.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    horizon: int
+    rate_hz: float
+    lower: np.ndarray
+    upper: np.ndarray
+    max_velocity: np.ndarray
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints that the actions move."""
+        return tuple(name for name in self.names if name != GRIPPER_COLUMN)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Input of a policy.
+
+    Attributes:
+        robot: Positions of the joints that the actions move, in the order of the actions.
+        gripper: Opening of the gripper as a fraction, from 0 (open) to 1 (closed); 0 without a gripper.
+        cameras: Images, keyed by the camera names of the task.
+        prompt: Instruction in words; "" for none.
+        time_s: Time since the policy took over [s of the ROS clock].
+        step: Number of actions executed so far.
+        actions: Required actions.
+        seed: Seed of all random numbers.
+    """
+
+    robot: RobotState
+    gripper: float
+    cameras: Mapping[str, CameraImages]
+    prompt: str
+    time_s: float
+    step: int
+    actions: ActionSpec
+    seed: int
+
+    @classmethod
+    def from_message(cls, message: Mapping[str, Any]) -> Observation:
+        """Creates the observation from the dictionary of a decoded message."""
+        robot, actions = message["robot"], message["actions"]
+        converted = {
+            "robot": RobotState(tuple(robot["joint_names"]), robot["positions"]),
+            "cameras": {name: CameraImages(**images) for name, images in message["cameras"].items()},
+            "actions": ActionSpec(**{**actions, "names": tuple(actions["names"])}),
+        }
+        return cls(**{**message, **converted})

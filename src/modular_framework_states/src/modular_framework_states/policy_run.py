@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loop of a policy: observe, query, check, execute."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import rospy
+
+from mbf_method.actions import checked_actions, limited_targets
+from mbf_method.errors import InvalidOutputError
+from mbf_method.grasp_request import RobotState
+from mbf_method.method_client import CallTimes, MethodClient
+from mbf_method.observation import Observation
+from mbf_method.openpi import openpi_request
+from modular_framework_core.grasping.ros_grasp_server import read_controllers
+from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_ros.reported_figures import (
+    POLICY_ACTIONS,
+    POLICY_METHOD_TIME,
+    POLICY_QUERIES,
+    POLICY_QUEUE_TIME,
+    POLICY_TRANSPORT_TIME,
+    Figure,
+)
+from modular_framework_ros.seeds import MAX_SEED, derived_seed, seed_parameter
+from modular_framework_ros.simulated_time import SimulatedTime
+from modular_framework_states.manipulator_postures import posture_positions
+from modular_framework_states.policy_actions import action_spec
+from modular_framework_states.policy_arm import PolicyArm, PolicyMotionError, trajectory_action
+from modular_framework_states.policy_cameras import PolicyCameras
+from modular_framework_states.policy_gripper import PolicyGripper
+
+PERIOD_S = 0.005
+MOTION_WAIT_S = 10.0
+"""Maximum time beyond the duration of a chunk, and for the arm to settle at the end [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolicySettings:
+    """Options of a task for a policy.
+
+    Attributes:
+        openpi_keys: Keys of an openpi-style server, by field; empty for a policy of mbf_method.
+        prompt: Instruction for the policy.
+        kind: Meaning of the joint columns.
+        joints: Joints that the policy moves; empty for all joints of the planning group.
+        postures: Open and closed posture of the gripper; empty without a gripper column.
+        horizon: Number of actions of a chunk.
+        rate_hz: Number of actions per second.
+        executed: Number of actions that run before the next query.
+        clamp: Whether targets outside the limits are moved to the limits.
+        max_duration_s: Maximum duration of the policy [s].
+        must_finish: Whether the policy must be done within the maximum duration.
+        camera_timeout_s: Maximum wait for images [s].
+    """
+
+    openpi_keys: Mapping[str, str]
+    prompt: str
+    kind: str
+    joints: tuple[str, ...]
+    postures: tuple[str, ...]
+    horizon: int
+    rate_hz: float
+    executed: int
+    clamp: bool
+    max_duration_s: float
+    must_finish: bool
+    camera_timeout_s: float
+
+
+class PolicyRun:
+    """One run of a policy.
+
+    Args:
+        state: State that runs the policy; a stop request ends the run.
+        userdata: Userdata with the commander and the client of the gripper.
+        settings: Options of the task.
+        cameras: Cameras of the observation.
+        client: Client of the policy.
+    """
+
+    def __init__(
+        self,
+        state: FrameworkState,
+        userdata: Any,
+        settings: PolicySettings,
+        cameras: PolicyCameras,
+        client: MethodClient,
+    ) -> None:
+        self._state, self._settings, self._cameras, self._client = state, settings, cameras, client
+        self._commander = userdata.arm_commander
+        self._gripper = _gripper(settings.postures, userdata)
+        self._spec = action_spec(
+            self._commander.group,
+            settings.joints,
+            settings.kind,
+            has_gripper=self._gripper is not None,
+            timing=(settings.horizon, settings.rate_hz),
+        )
+        joints = self._spec.joint_names
+        self._arm = PolicyArm(trajectory_action(read_controllers(), joints), joints, settings.rate_hz)
+        self._time = SimulatedTime()
+        self._step, self._start_s = 0, 0.0
+
+    def run(self, figures: dict[Figure, float]) -> None:
+        """Lets the policy drive until it is done or its time is over; the arm is held afterwards.
+
+        Args:
+            figures: Receives the figures of the run.
+
+        Raises:
+            MethodError: The policy returned no valid actions; the class of the error is the kind of fault.
+            PolicyMotionError: The controller did not execute a chunk, or the policy was not done in time.
+            CallCancelledError: A stop was requested during a query.
+            CallError, GraspGoalError, PolicyCameraError: A controller, the gripper or a camera is missing.
+        """
+        self._arm.connect()
+        self._client.start()
+        self._start_s = rospy.get_time()
+        try:
+            is_done = self._drive(figures)
+            self._settle()
+        finally:
+            self._arm.stop()
+        if not is_done and self._settings.must_finish:
+            raise PolicyMotionError(f"the policy was not done within {self._settings.max_duration_s:g} s")
+
+    def _drive(self, figures: dict[Figure, float]) -> bool:
+        """Executes chunks; returns whether the policy is done."""
+        target: npt.NDArray[np.float64] | None = None
+        while not self._state.stop_requested():
+            left = (self._settings.max_duration_s - (rospy.get_time() - self._start_s)) * self._settings.rate_hz
+            if left < 1.0:
+                return False
+            with self._time.held("run_policy"):
+                observation = self._observation()
+                actions = self._actions(observation, figures)
+            if not len(actions):
+                return True
+            if target is None:
+                gripper = [] if self._gripper is None else [observation.gripper]
+                target = np.append(observation.robot.positions, gripper)
+            targets = limited_targets(actions, self._spec, target)
+            if targets.fault and not self._settings.clamp:
+                raise InvalidOutputError(targets.fault)
+            executed = targets.values[: int(min(self._settings.executed, left))]
+            self._execute(executed)
+            target = executed[-1]
+            self._step += len(executed)
+            figures[POLICY_ACTIONS] = float(self._step)
+        return False
+
+    def _observation(self) -> Observation:
+        joints, setting = self._spec.joint_names, self._settings
+        cameras = self._cameras.take(setting.camera_timeout_s)
+        observed = [*joints] if self._gripper is None else [*joints, self._gripper.observed_joint]
+        positions = self._commander.positions_of(observed)
+        if missing := [name for name in observed if name not in positions]:
+            raise PolicyMotionError(f"topic '{rospy.resolve_name('joint_states')}' lacks the joints {missing}")
+        return Observation(
+            robot=RobotState(joints, np.array([positions[name] for name in joints])),
+            gripper=0.0 if self._gripper is None else self._gripper.fraction_at(positions[observed[-1]]),
+            cameras=cameras,
+            prompt=setting.prompt,
+            time_s=rospy.get_time() - self._start_s,
+            step=self._step,
+            actions=self._spec,
+            seed=_seed(self._step),
+        )
+
+    def _actions(self, observation: Observation, figures: dict[Figure, float]) -> npt.NDArray[np.float64]:
+        """Returns the checked actions of the policy, and adds the durations of the query to the figures."""
+        keys = self._settings.openpi_keys
+        request = openpi_request(observation, keys) if keys else observation
+        result = self._client.call(request, is_cancelled=self._state.stop_requested)
+        _add_times(figures, result.times)
+        return checked_actions(result.message, self._spec)
+
+    def _execute(self, targets: npt.NDArray[np.float64]) -> None:
+        """Executes targets, shape (n, a), and returns at the time of the last target."""
+        joints, next_row = len(self._spec.joint_names), 0
+        self._arm.start(targets[:, :joints])
+
+        def is_over() -> bool:
+            nonlocal next_row
+            reached = min(self._arm.reached_targets(), len(targets) - 1)
+            if self._gripper is not None and reached >= next_row:
+                self._gripper.move(float(targets[reached, -1]))
+                next_row = reached + 1
+            return self._arm.has_ended() or self._arm.reached_targets() >= len(targets)
+
+        duration_s = len(targets) / self._settings.rate_hz
+        is_in_time = self._state.wait_until(is_over, duration_s + MOTION_WAIT_S, PERIOD_S)
+        self._refuse_fault(is_in_time, f"{duration_s + MOTION_WAIT_S:g} s")
+
+    def _settle(self) -> None:
+        """Waits until the controller has ended the last chunk."""
+        if self._step and not self._state.stop_requested():
+            is_in_time = self._state.wait_until(self._arm.has_ended, MOTION_WAIT_S, PERIOD_S)
+            self._refuse_fault(is_in_time, f"{MOTION_WAIT_S:g} s after the last target")
+
+    def _refuse_fault(self, is_in_time: bool, limit: str) -> None:
+        if fault := self._arm.fault():
+            raise PolicyMotionError(fault)
+        if not is_in_time and not self._state.stop_requested():
+            raise PolicyMotionError(f"the motion of a chunk was not over within {limit}")
+
+
+def _gripper(postures: tuple[str, ...], userdata: Any) -> PolicyGripper | None:
+    """Returns the gripper between two postures; None without postures."""
+    if not postures:
+        return None
+    opened, closed = (posture_positions(name) for name in postures)
+    return PolicyGripper(opened, closed, userdata.manipulator_controller_client, userdata.max_torque)
+
+
+def _seed(step: int) -> int:
+    """Returns the seed of a query, derived from the parameter ``/seed``; random if the parameter is not set."""
+    seed = seed_parameter()
+    return secrets.randbelow(MAX_SEED + 1) if seed is None else derived_seed(seed, "run_policy", step)
+
+
+def _add_times(figures: dict[Figure, float], times: CallTimes) -> None:
+    added = {
+        POLICY_QUERIES: 1.0,
+        POLICY_METHOD_TIME: times.method_s,
+        POLICY_QUEUE_TIME: times.queue_s,
+        POLICY_TRANSPORT_TIME: times.transport_s,
+    }
+    for figure, value in added.items():
+        figures[figure] = figures.get(figure, 0.0) + value

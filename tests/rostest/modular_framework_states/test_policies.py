@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Policies in their own process drive an arm and a gripper of fake hardware through the ordinary controllers."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from controller_manager_msgs.srv import LoadController, SwitchController
+from sensor_msgs.msg import Image
+from std_msgs.msg import String
+from websockets.sync.server import ServerConnection, serve
+
+import smach
+from mbf_method.errors import MethodFault
+from mbf_method.wire import pack, unpack
+from modular_framework_core.commander.robot_groups import read_group
+from modular_framework_core.commander.ros_joint_monitor import JointMonitor
+from modular_framework_core.msg import GraspAction
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.calls import wait_until
+from modular_framework_states.states.run_policy import RunPolicy
+
+ROOT = Path(__file__).resolve().parents[3]
+PYTHON = ["/usr/bin/env", f"PYTHONPATH={ROOT / 'src/mbf_method/src'}", sys.executable]
+EXAMPLE = [*PYTHON, str(ROOT / "docs/examples/my_policy.py")]
+FAULTY = ROOT / "tests/unit/mbf_method/faulty_policy.py"
+CAMERA_TOPIC = "front/image_raw"
+
+
+def faulty(fault: str) -> list[str]:
+    return [sys.executable, str(FAULTY), fault]
+
+
+class Robot:
+    """Userdata and reports of a running arm."""
+
+    def __init__(self) -> None:
+        urdf, srdf = (rospy.get_param(name) for name in ("robot_description", "robot_description_semantic"))
+        self._monitor = JointMonitor()
+        self._monitor.connect()
+        self.reports: list[dict[str, Any]] = []
+        rospy.Subscriber("component_reports", String, lambda message: self.reports.append(json.loads(message.data)))
+        self.commander = SimpleNamespace(group=read_group(urdf, srdf, "arm"), positions_of=self._monitor.positions)
+        self.gripper = SteadyActionClient("moveit_grasp_action_server", GraspAction)
+        assert wait_until(lambda: len(self.positions()) == 3, 60.0)
+
+    def positions(self) -> dict[str, float]:
+        return self._monitor.positions(["shoulder", "elbow", "finger"])
+
+    def comes_to_rest(self) -> bool:
+        return self._monitor.wait_for_rest(["shoulder", "elbow"], lambda: False)
+
+    def run(self, state: RunPolicy) -> str:
+        machine = smach.StateMachine(outcomes=["success", "fail"])
+        machine.userdata.arm_commander = self.commander
+        machine.userdata.manipulator_controller_client = self.gripper
+        machine.userdata.max_torque = 1.0
+        self.reports.clear()
+        with machine:
+            smach.StateMachine.add("ONLY", state, transitions={})
+        outcome = machine.execute()
+        assert wait_until(lambda: bool(self.reports), 10.0)
+        return str(outcome)
+
+
+@pytest.fixture(scope="module")
+def robot(ros_session: Any) -> Robot:
+    names = ["joint_state_controller", "arm", "gripper"]
+    for service, kind in (("load_controller", LoadController), ("switch_controller", SwitchController)):
+        rospy.wait_for_service(f"controller_manager/{service}", 60.0)
+        proxy = rospy.ServiceProxy(f"controller_manager/{service}", kind)
+        if service == "load_controller":
+            assert all(proxy(name).ok for name in names)
+        else:
+            assert proxy(names, [], 2, False, 0.0).ok
+    return Robot()
+
+
+@pytest.fixture
+def camera() -> Iterator[None]:
+    publisher, over = rospy.Publisher(CAMERA_TOPIC, Image, queue_size=1), threading.Event()
+
+    def publish() -> None:
+        while not over.wait(0.05):
+            image = Image(height=2, width=3, encoding="rgb8", step=9, data=bytes(range(18)))
+            image.header.stamp = rospy.Time.now()
+            publisher.publish(image)
+
+    thread = threading.Thread(target=publish, daemon=True)
+    thread.start()
+    yield
+    over.set()
+    thread.join()
+
+
+def test_the_example_drives_the_arm_to_its_goal_and_closes_the_gripper(robot: Robot, camera: None) -> None:
+    state = RunPolicy(
+        command=EXAMPLE,
+        cameras={"front": CAMERA_TOPIC},
+        gripper=["open", "closed"],
+        rate=20.0,
+        horizon=8,
+        chunk=4,
+        max_duration=60.0,
+        must_finish=True,
+    )
+    assert robot.run(state) == "success", state.reason
+    positions = robot.positions()
+    assert positions["shoulder"] == pytest.approx(0.4, abs=0.01)
+    assert positions["elbow"] == pytest.approx(-0.3, abs=0.01)
+    assert positions["finger"] > 0.9 * 0.8
+    (report,) = robot.reports
+    figures = report["figures"]
+    assert (report["component"], report["succeeded"]) == ("policy", True)
+    assert figures["actions"] == 4 * (figures["queries"] - 1)  # the last query is answered by the end of the task
+    assert figures["method_time_s"] > 0.0 and figures["transport_time_s"] > 0.0
+
+
+def test_a_policy_without_an_end_drives_for_its_duration(robot: Robot) -> None:
+    before = robot.positions()
+    state = RunPolicy(command=faulty("never ends"), rate=20.0, horizon=4, max_duration=1.0)
+    assert robot.run(state) == "success", state.reason
+    assert robot.positions()["shoulder"] > before["shoulder"] + 0.05
+    state = RunPolicy(command=faulty("never ends"), rate=20.0, horizon=4, max_duration=0.5, must_finish=True)
+    assert robot.run(state) == "fail"
+    assert "the policy was not done within 0.5 s" in state.reason
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "reason"),
+    [
+        ("exits", MethodFault.NOT_STARTED, "exited with code 3"),
+        ("dies", MethodFault.DIED, "was ended by SIGKILL"),
+        ("hangs", MethodFault.LATE, "no result within 1 s"),
+        ("returns NaN", MethodFault.INVALID_RESULT, "actions[1] has a shoulder that is not finite"),
+        ("leaves the limits", MethodFault.INVALID_RESULT, "to 100.0000; it must be from -2.0000 to 2.0000"),
+    ],
+)
+def test_a_fault_ends_the_state_with_its_kind_and_holds_the_arm(
+    robot: Robot, fault: str, kind: MethodFault, reason: str
+) -> None:
+    state = RunPolicy(command=faulty(fault), rate=20.0, horizon=4, time_limit=1.0)
+    assert robot.run(state) == "fail"
+    assert reason in state.reason
+    assert robot.reports[0]["figures"]["method_fault"] == kind
+    assert robot.comes_to_rest()
+    start = robot.positions()
+    assert not wait_until(lambda: abs(robot.positions()["shoulder"] - start["shoulder"]) > 1e-3, 0.5)
+
+
+def test_targets_outside_the_limits_are_clamped_on_request(robot: Robot) -> None:
+    state = RunPolicy(command=faulty("leaves the limits"), rate=20.0, horizon=4, clamp=True, max_duration=10.0)
+    assert robot.run(state) == "success", state.reason
+    assert robot.positions()["shoulder"] <= 2.0
+
+
+@pytest.mark.parametrize("kind", ["velocities", "deltas"])
+def test_an_openpi_server_drives_the_arm(robot: Robot, camera: None, kind: str) -> None:
+    received: list[dict[str, Any]] = []
+
+    def handle(connection: ServerConnection) -> None:
+        connection.send(pack({"action_horizon": 4}))
+        for data in connection:
+            received.append(unpack(data))
+            actions = np.tile([-0.4, 0.0] if kind == "velocities" else [-0.02, 0.0], (4, 1))
+            connection.send(pack({"actions": actions, "server_timing": {"infer_ms": 1.0}}))
+
+    before = robot.positions()
+    with serve(handle, "127.0.0.1", 0, compression=None) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        state = RunPolicy(
+            address=f"ws://127.0.0.1:{server.socket.getsockname()[1]}",
+            openpi_keys={"positions": "observation/state", "front": "observation/image", "prompt": "prompt"},
+            cameras={"front": CAMERA_TOPIC},
+            prompt="lower the arm",
+            actions=kind,
+            rate=20.0,
+            horizon=4,
+            max_duration=1.5,
+        )
+        assert robot.run(state) == "success", state.reason
+        server.shutdown()
+    actions = robot.reports[0]["figures"]["actions"]
+    assert before["shoulder"] - robot.positions()["shoulder"] == pytest.approx(0.02 * actions, abs=0.01)
+    assert (received[0]["prompt"], received[0]["observation/image"].shape) == ("lower the arm", (2, 3, 3))
+    assert received[0]["observation/state"].tolist() == pytest.approx([before["shoulder"], before["elbow"]], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"command": EXAMPLE, "joints": ["wrist"]}, "has no active joint 'wrist'"),
+        ({"command": EXAMPLE, "cameras": {"side": "no/camera"}, "camera_timeout": 0.5}, "camera 'side': no message"),
+        ({"command": EXAMPLE, "gripper": ["open", "ajar"]}, "has no state 'ajar'"),
+    ],
+)
+def test_a_missing_joint_camera_or_posture_is_named(robot: Robot, options: dict[str, Any], reason: str) -> None:
+    state = RunPolicy(**options)
+    assert robot.run(state) == "fail"
+    assert reason in state.reason
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({}, "give either command or address"),
+        ({"command": EXAMPLE, "openpi_keys": {"prompt": "prompt"}}, "openpi_keys needs the address"),
+        ({"address": "ws://127.0.0.1:1", "openpi_keys": {"side": "image"}}, "openpi_keys names ['side']"),
+        ({"command": EXAMPLE, "gripper": ["open"]}, "gripper has 1 items"),
+        ({"command": EXAMPLE, "horizon": 2, "chunk": 3}, "chunk is 3; it must be at most the horizon, 2"),
+    ],
+)
+def test_options_that_exclude_each_other_are_refused(options: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ValueError) as refused:
+        RunPolicy(**options)
+    assert reason in str(refused.value)
