@@ -31,8 +31,10 @@ def _parser() -> argparse.ArgumentParser:
         "the same method, levels, trial and seed are compared in pairs.",
         epilog="Exit code: 0; 1 with --fail-on-regression after a regression; 2 if the experiments are not comparable.",
     )
-    parser.add_argument("before", help="result database of the earlier experiment: a file, or a URL of SQLAlchemy")
-    parser.add_argument("after", nargs="?", help="database of the later experiment; default: the same database")
+    parser.add_argument(
+        "before", help="results of the earlier experiment: a database (a file, or a URL of SQLAlchemy), or a CSV table"
+    )
+    parser.add_argument("after", nargs="?", help="results of the later experiment; default: the same database")
     parser.add_argument("--experiment", metavar="NAME", help="earlier experiment, if its database has several")
     parser.add_argument("--with", dest="other", metavar="NAME", help="later experiment; default: the same name")
     parser.add_argument("--into", type=Path, metavar="FILE", help="also write an HTML page")
@@ -56,8 +58,6 @@ def _compare(arguments: argparse.Namespace) -> int:
         regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
         print(regression_text(regression), end="")
         if arguments.into is not None:
-            write_file(
-                arguments.into, regression_page(regression, before.database.label, after.database.label).encode()
-            )
+            write_file(arguments.into, regression_page(regression, before.label, after.label).encode())
             print(f"compare: wrote {arguments.into}", file=sys.stderr)
     return EXIT_REGRESSED if arguments.fail_on_regression and regression.count(Change.WORSE) else 0

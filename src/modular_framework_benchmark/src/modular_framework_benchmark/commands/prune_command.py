@@ -14,7 +14,7 @@ import pandas as pd
 from modular_framework_benchmark.commands.reporting import database_parser, run_reporting
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.errors import ReportError
-from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.report_source import open_experiment
 from modular_framework_benchmark.scheduling.disk_guard import GB, tree_size
 
 KINDS = {
@@ -62,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _prune(arguments: argparse.Namespace) -> int:
-    with open_source(arguments.database, arguments.experiment) as opened:
+    with open_experiment(arguments.database, arguments.experiment) as opened:
         root = opened.database.folder.resolve()
         episodes = opened.results.episodes
         name = opened.results.description.name

@@ -37,7 +37,7 @@ def write_page(experiment: OpenedExperiment, page: Path) -> str:
         ResultsError: The database is unreadable.
     """
     content = gather_content(experiment.results, experiment.source(page.absolute().parent))
-    write_file(page, report_page(content, experiment.database.label).encode())
+    write_file(page, report_page(content, experiment.label).encode())
     return answer_text(content)
 
 
@@ -45,7 +45,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = database_parser(
         "report",
         "Reports which method is better, in which metric, and with which confidence, as one HTML page. "
-        "With --figure or --table only that part is written.",
+        "With --figure or --table only that part is written. In place of a database, a CSV table with the columns "
+        "method, problem, success and 'METRIC [UNIT] lower' or '... higher' is allowed.",
     )
     parser.add_argument("--into", type=Path, metavar="FILE", help="output file; default: named after the experiment")
     parser.add_argument(
@@ -82,7 +83,7 @@ def _report(arguments: argparse.Namespace) -> int:
         if figure:
             write_file(output, figure_image(find_figure(content.figures, figure), image_format))
         else:
-            write_file(output, report_page(content, experiment.database.label).encode())
+            write_file(output, report_page(content, experiment.label).encode())
     print(answer_text(content))
     print(f"report: wrote {output}", file=sys.stderr)
     return 0

@@ -49,7 +49,12 @@ def report_page(content: ReportContent, database: str) -> str:
         database: Database as named by the user.
     """
     figures = {figure.name: figure for figure in content.figures}
-    parts = (("robustness", content.robustness), ("levels", content.levels), ("timelines", content.spans))
+    parts = (
+        ("robustness", content.robustness),
+        ("levels", content.levels),
+        ("timelines", content.spans),
+        ("progress", not content.is_table),
+    )
     absent = {name for name, part in parts if not part}
     return render_page(
         "report.html.jinja",

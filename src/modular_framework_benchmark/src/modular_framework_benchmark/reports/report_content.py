@@ -44,6 +44,7 @@ from modular_framework_benchmark.reports.success_figures import (
     ranking_figure,
 )
 from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
+from modular_framework_benchmark.results.own_table import MODE
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
 from modular_framework_benchmark.statistics.observations import metrics_of, unmeasured_reason
@@ -143,6 +144,11 @@ class ReportContent:
     recorded: tuple[RecordedValue, ...]
     warnings: tuple[str, ...]
     commands: tuple[str, ...]
+
+    @property
+    def is_table(self) -> bool:
+        """Returns whether another program measured the episodes, so that there is nothing to repeat."""
+        return self.description.mode == MODE
 
     @property
     def unit_noun(self) -> str:

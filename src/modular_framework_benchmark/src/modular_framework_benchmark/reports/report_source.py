@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Opens an experiment of a result database for a report."""
+"""Opens an experiment of a result database, or a CSV table, for a report."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
+
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.records.snapshot_parts import PartKind, parts_of
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
 from modular_framework_benchmark.reports.run_record import CombinationSnapshots, SnapshotValues
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
+from modular_framework_benchmark.results.own_table import read_table
+
+SPAN_SUMS = ("count", "ended", "failed", "total_s", "covered_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +34,11 @@ class OpenedExperiment:
     database: ResultDatabase
     number: int
     results: ExperimentResults
+
+    @property
+    def label(self) -> str:
+        """Returns the name of the database for messages."""
+        return self.database.label
 
     @property
     def snapshots(self) -> SnapshotValues:
@@ -64,8 +74,41 @@ class OpenedExperiment:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class OpenedTable:
+    """A CSV table of results, which has neither snapshots nor spans nor files.
+
+    Attributes:
+        path: File of the table.
+        results: Episodes of the table.
+    """
+
+    path: Path
+    results: ExperimentResults
+
+    @property
+    def label(self) -> str:
+        """Returns the name of the table for messages."""
+        return str(self.path)
+
+    @property
+    def compared_snapshots(self) -> CombinationSnapshots:
+        """Returns no values."""
+        return {}
+
+    def source(self, report_folder: Path) -> ReportSource:
+        """Returns the source of a report without further data.
+
+        Args:
+            report_folder: Folder of the report.
+        """
+        totals = pd.DataFrame(columns=["kind", "name", self.results.description.compared, *SPAN_SUMS])
+        spans = self.results.spans
+        return ReportSource(self.label, self.path.parent, report_folder, {}, {}, totals, {}, lambda episodes: spans)
+
+
 @contextlib.contextmanager
-def open_source(target: str, name: str | None) -> Iterator[OpenedExperiment]:
+def open_experiment(target: str, name: str | None) -> Iterator[OpenedExperiment]:
     """Opens a database read-only and loads an experiment.
 
     Args:
@@ -79,6 +122,28 @@ def open_source(target: str, name: str | None) -> Iterator[OpenedExperiment]:
     with open_database(target, read_only=True) as database:
         number = find_experiment(database, name)
         yield OpenedExperiment(database, number, database.load(number, spans=False))
+
+
+@contextlib.contextmanager
+def open_source(target: str, name: str | None) -> Iterator[OpenedExperiment | OpenedTable]:
+    """Opens a database read-only and loads an experiment, or reads a CSV table.
+
+    Args:
+        target: Database or table as named by the user.
+        name: Name of the experiment; None for the only experiment.
+
+    Raises:
+        ReportError: The database has several experiments and none is named, is empty, or a table has another name.
+        ResultsError: The database is unreadable, or lacks the experiment; the table has faults.
+    """
+    if "://" not in target and Path(target).suffix.lower() == ".csv":
+        results = read_table(Path(target))
+        if name not in (None, results.description.name):
+            raise ReportError(f"{target} is a table; --experiment has no effect there, remove it")
+        yield OpenedTable(Path(target), results)
+        return
+    with open_experiment(target, name) as experiment:
+        yield experiment
 
 
 def find_experiment(database: ResultDatabase, name: str | None) -> int:

@@ -17,6 +17,7 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.records.snapshot_parts import REFERENCE, UNKNOWN_SOURCES, PartKind, kind_of
 from modular_framework_benchmark.records.used_software import IMPLEMENTATION
 from modular_framework_benchmark.reports.number_text import count_phrase
+from modular_framework_benchmark.results.own_table import MODE
 from modular_framework_ros.reported_figures import Clock
 
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
@@ -291,13 +292,15 @@ def _combination_keys(results: ExperimentResults) -> set[str]:
 
 
 def commands_to_repeat(results: ExperimentResults, recorded: Sequence[RecordedValue], database: str) -> tuple[str, ...]:
-    """Returns the commands that repeat the experiment and report it.
+    """Returns the commands that repeat the experiment and report it; none for a table of other programs.
 
     Args:
         results: Finished episodes.
         recorded: Recorded values of the snapshots.
         database: Database as named by the user.
     """
+    if results.description.mode == MODE:
+        return ()
     name = results.description.name
     file, again = shlex.quote(f"{name}.yaml"), shlex.quote(f"{name}_again.db")
     revisions = [item.values[0][0] for item in recorded if item.name.endswith("git_revision") and item.values]
