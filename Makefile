@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-.PHONY: help build lint unit rostest system test full bench site requirements
+.PHONY: help build lint unit rostest system test full bench site wheel requirements
 help:            ## list what can be made
 	@grep -E '^[a-z]+: *##' $(MAKEFILE_LIST) | sed 's/: *##/\t/' | expand -t 16
 build:           ## set up and build
@@ -20,6 +20,8 @@ bench:           ## run every benchmark, quickly
 	@for benchmark in benchmarks/*; do [ -x $$benchmark ] && ./install.sh exec $$benchmark --quick || exit 1; done
 site:            ## build the documentation as a web site
 	./install.sh site
+wheel:           ## build the wheel of statistics and reports, which needs no ROS
+	./install.sh wheel
 requirements:    ## compile requirements.txt and requirements-site.txt
 	.venv/bin/pip install --quiet pip-tools
 	.venv/bin/pip-compile --quiet --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --strip-extras --no-header -o requirements.txt requirements.in

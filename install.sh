@@ -23,6 +23,7 @@ usage: ./install.sh [COMMAND]
   doctor [ARG:=VALUE..]  check installation, configuration and running nodes; --report FILE writes what an issue needs
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
   site                 set up, then build the documentation as a web site, which any browser opens from the disk
+  wheel [FOLDER]       build the wheel of statistics and reports, which needs no ROS, into FOLDER (default: build_wheel)
   packages             only install the Debian packages and the Python environment
   help                 show this text
 
@@ -411,6 +412,10 @@ main() {
       export PYTHONPATH="$SITE_BUILDER:${PYTHONPATH:-}"
       exec "$VENV/bin/python3" "$ROOT/docs/site/build_site.py" "$@"
       ;;
+    wheel)
+      set_up_packages
+      exec "$VENV/bin/pip" wheel --disable-pip-version-check --no-deps --wheel-dir "${1:-$ROOT/build_wheel}" "$ROOT"
+      ;;
     shell)
       set_up
       source_workspace
@@ -420,7 +425,7 @@ main() {
     help | -h | --help) usage ;;
     *)
       usage >&2
-      fail "unknown command '$command'" "use one of: run, experiment, test, doctor, shell, exec, site, packages, help"
+      fail "unknown command '$command'" "use one of: run, experiment, test, doctor, shell, exec, site, wheel, packages, help"
       ;;
   esac
 }
