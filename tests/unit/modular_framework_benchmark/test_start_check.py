@@ -45,6 +45,16 @@ def change(file: Path, old: str, new: str) -> None:
     file.write_text(text.replace(old, new))
 
 
+def test_tasks_find_the_models_in_the_folders_of_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"{tmp_path}:")
+    started = end_of_roslaunch(*START)
+    assert started.returncode == 0, started.stderr
+    models = Path(rospkg.RosPack().get_path("modular_framework_description")) / "models"
+    assert f"/gazebo_model_path: {models}/:{tmp_path}\n" in started.stdout
+
+
 def end_of_roslaunch(*words: str) -> subprocess.CompletedProcess[str]:
     """Loads a launch file and its parameters without starting anything."""
     return subprocess.run(["roslaunch", "--dump-params", *words], capture_output=True, text=True, check=False)

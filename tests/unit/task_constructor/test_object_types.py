@@ -36,6 +36,16 @@ def test_a_type_without_a_model_is_refused_with_the_nearest_one(
     assert message.rstrip().endswith("did you mean 'cube'?")
 
 
+def test_a_model_in_a_folder_of_the_environment_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = tmp_path / "lab" / "brick_of_lab" / "model.sdf"
+    model.parent.mkdir(parents=True)
+    model.touch()
+    (tmp_path / "tiny.yaml").write_text(TASK % ("", "brick_of_lab"))
+    assert main([str(tmp_path / "tiny.yaml"), "--check"]) == 1
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"/nowhere:{tmp_path / 'lab'}")
+    assert main([str(tmp_path / "tiny.yaml"), "--check"]) == 0
+
+
 def test_a_package_without_models_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "tiny.yaml").write_text(TASK % ("", "cube"))
     for package in ("no_such_package", "modular_framework_core"):

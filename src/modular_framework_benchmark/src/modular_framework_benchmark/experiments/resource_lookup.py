@@ -60,7 +60,7 @@ class ResourceLookup(Protocol):
         """Returns the SDF file of a model.
 
         Args:
-            name: Name of a model in the description package, or path of an .sdf file.
+            name: Name of a model in the search path of models, or path of an .sdf file.
             launch: Launch file whose argument `description_package` names that package.
             arguments: Arguments of the launch file.
             folder: Base of relative paths.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +14,7 @@ import rospkg
 
 from modular_framework_benchmark.experiments.model_sizes import listed_lines, movable_joints
 from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld, UnresolvedReference
-from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
+from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER, model_search_path
 from modular_framework_core.launching.launch_arguments import (
     ArgumentError,
     argument_values,
@@ -88,7 +89,7 @@ class RosResourceLookup:
         """Returns the SDF file of a model.
 
         Args:
-            name: Name of a model in the description package, or path of an .sdf file.
+            name: Name of a model in the search path of models, or path of an .sdf file.
             launch: Launch file that names the description package.
             arguments: Arguments of the launch file.
             folder: Base of relative paths.
@@ -98,17 +99,21 @@ class RosResourceLookup:
             if path.is_file():
                 return path
             raise UnresolvedReference(f"there is no model file {path}; give the path of an .sdf file")
-        models = self._description(launch, arguments) / "models"
-        if (models / name / "model.sdf").is_file():
-            return models / name / "model.sdf"
-        model_names = sorted(file.parent.name for file in models.glob("*/model.sdf"))
+        folders = model_search_path(self._description(launch, arguments) / "models")
+        found = next(
+            (folder / name / "model.sdf" for folder in folders if (folder / name / "model.sdf").is_file()), None
+        )
+        if found is not None:
+            return found
+        model_names = sorted(file.parent.name for folder in folders for file in folder.glob("*/model.sdf"))
         raise UnresolvedReference(f"there is no model '{name}'; {listing(model_names)}{nearest(name, model_names)}")
 
     def world_models(self, launch: str, arguments: Mapping[str, str]) -> Mapping[str, Sequence[str]]:
         """Returns the movable joints of each model in the world of a launch, keyed by model."""
         description = self._description(launch, arguments)
         file = self._launch_values(launch, arguments).get("world_file", "")
-        return models_of_world(description / "worlds" / file, str(description / "models")) if file else {}
+        models = os.pathsep.join(map(str, model_search_path(description / "models")))
+        return models_of_world(description / "worlds" / file, models) if file else {}
 
     def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
         package = self._launch_values(launch, arguments).get("description_package", "")

@@ -27,7 +27,7 @@ class PlacedObject:
 
     Attributes:
         name: Name of the object in the world.
-        model: Folder in the description package's models, or absolute path of an .sdf file.
+        model: Folder in the search path of models, or absolute path of an .sdf file.
         x: Position in the world frame, with y and z [m].
         roll: Angle in the world frame, with pitch and yaw [rad].
         scale: Factor of the model's lengths; None for the size of the model file.

@@ -17,6 +17,8 @@ TEMPLATES_PACKAGE = "modular_framework_core"
 API_PACKAGE = "modular_framework_api"
 SCRIPTS_FOLDER = "task_constructor_scripts"
 LAUNCH_FILE = "start_framework.launch"
+MODEL_PATH_VARIABLE = "GAZEBO_MODEL_PATH"
+"""Environment variable that lists folders of models, separated by colons, as in Gazebo."""
 
 
 def framework_home() -> Path:
@@ -83,6 +85,15 @@ def models_folder(package: str = "") -> Path | None:
     package = package or _default_argument("description_package")
     folder = _package(package) if package else None
     return None if folder is None or not (folder / "models").is_dir() else folder / "models"
+
+
+def model_search_path(models: Path) -> tuple[Path, ...]:
+    """Returns the folders in which tasks and experiments find models by name, in search order.
+
+    Args:
+        models: Folder of the models of the description package; the folders in GAZEBO_MODEL_PATH follow.
+    """
+    return (models, *(Path(folder) for folder in os.environ.get(MODEL_PATH_VARIABLE, "").split(os.pathsep) if folder))
 
 
 def _default_argument(name: str) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -192,7 +193,8 @@ def names_of_installation(config: Path | None, moveit_package: str = "", descrip
     names = KnownNames() if folder is None else names_of_config(folder)
     models = default_folders.models_folder(description)
     if models is not None:
-        names = names.with_object_types(str(models), str(models))
+        path = os.pathsep.join(map(str, default_folders.model_search_path(models)))
+        names = names.with_object_types(path, path)
     elif description:
         raise ValueError(
             f"package '{description}' is not found, or has no folder models; name the package with the models"

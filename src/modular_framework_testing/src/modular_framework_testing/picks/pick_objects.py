@@ -19,7 +19,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import rosgraph
@@ -31,6 +30,7 @@ from moveit_msgs.srv import GetPlanningScene
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
+from modular_framework_core.files.model_files import model_file
 from modular_framework_core.srv import AddStandardisedGrasp, GetStandardisedGrasp
 
 # model -> height of its frame above the surface it stands on [m] (the frame is in the middle of the model)
@@ -84,7 +84,7 @@ def spawn(name: str, model: str, xy: tuple[float, float], yaw: float) -> str:
         The reason of a failure, or "".
     """
     place = service("/gazebo/spawn_sdf_model", SpawnModel)
-    text = (Path(rospy.get_param("/gazebo_model_path")) / model / "model.sdf").read_text()
+    text = model_file(model, rospy.get_param("/gazebo_model_path")).read_text()
     pose = Pose(
         Point(*xy, TABLE_TOP_M + OBJECTS[model] + 0.001), Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     )
