@@ -12,16 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 from experiment_texts import PICK, faults_of, read
 
 from modular_framework_benchmark.commands.mode_runners import known_metrics, setting_checks
-from modular_framework_benchmark.commands.ros_run_command import experiment_path
+from modular_framework_benchmark.commands.ros_run_command import experiment_path, run_experiment
 from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 from modular_framework_benchmark.experiments.task_mode import TaskSettings
 from modular_framework_benchmark.records.episode_settings import PlacedObject
+from modular_framework_description.add_object_command import main as add_object
 
 BLOCKS = (
     "{model: cube, name: block, count: 4, size: $edge, spacing: 0.12, x: [-0.2, 0.2], y: [0.4, 0.6], rests_at: 0.8}"
@@ -78,6 +80,37 @@ def test_the_figures_of_the_grasp_are_about_the_first_block_that_must_be_lifted(
     assert first.settings_of(TaskSettings).judged_object == "block_2"
     (first, *_) = plan_episodes(read(TOWER, tmp_path))
     assert first.settings_of(TaskSettings).judged_object == "block_1"
+
+
+OWN_OBJECT = """
+experiment: own_object
+mode: task
+task: simulation_pick.yaml
+arguments: {world_file: ur5_table.world}
+objects: [{model: bracket_of_lab, x: [-0.2, 0.2], y: 0.5, rests_at: 0.84}]
+success: {lifted: 0.1}
+parameters: {/planner_name: $planner}
+factors: {planner: [RRTConnect, RRT]}
+compare: planner
+trials: 2
+"""
+
+
+def test_an_experiment_takes_an_added_object_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh, file = tmp_path / "bracket_of_lab.stl", tmp_path / "own_object.yaml"
+    trimesh.creation.box(extents=(0.04, 0.06, 0.1)).export(mesh)
+    assert add_object([str(mesh), "--mass", "0.2", "--directory", str(tmp_path / "lab")]) == 0
+    file.write_text(OWN_OBJECT)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("GAZEBO_MODEL_PATH", raising=False)
+    assert run_experiment([str(file), "--dry-run"]) == 2
+    assert "there is no model 'bracket_of_lab'" in capsys.readouterr().err
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", str(tmp_path / "lab"))
+    assert run_experiment([str(file), "--dry-run"]) == 0, capsys.readouterr().err
+    output = capsys.readouterr().out
+    assert "own_object: 4 episodes" in output
 
 
 @cache

@@ -107,6 +107,29 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
+class MeshBody:
+    """A rigid body whose shapes are files in the folder ``meshes`` of the model.
+
+    Attributes:
+        name: Name of the model folder.
+        description: Sentence for model.config.
+        properties: Mass, centre of mass and inertia in the body axes.
+        friction: Coulomb friction coefficient.
+        colour: Red, green, blue in [0, 1].
+        visual: File of the visual mesh.
+        parts: Files of the convex parts.
+    """
+
+    name: str
+    description: str
+    properties: MassProperties
+    friction: float
+    colour: tuple[float, float, float]
+    visual: str
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class MassProperties:
     """Mass properties in the body axes.
 

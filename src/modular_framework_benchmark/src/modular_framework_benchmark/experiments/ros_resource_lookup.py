@@ -15,6 +15,7 @@ import rospkg
 from modular_framework_benchmark.experiments.model_sizes import listed_lines, movable_joints
 from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld, UnresolvedReference
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER, model_search_path
+from modular_framework_core.files.model_files import model_file
 from modular_framework_core.launching.launch_arguments import (
     ArgumentError,
     argument_values,
@@ -100,10 +101,8 @@ class RosResourceLookup:
                 return path
             raise UnresolvedReference(f"there is no model file {path}; give the path of an .sdf file")
         folders = model_search_path(self._description(launch, arguments) / "models")
-        found = next(
-            (folder / name / "model.sdf" for folder in folders if (folder / name / "model.sdf").is_file()), None
-        )
-        if found is not None:
+        found = model_file(name, os.pathsep.join(map(str, folders)))
+        if found.is_file():
             return found
         model_names = sorted(file.parent.name for folder in folders for file in folder.glob("*/model.sdf"))
         raise UnresolvedReference(f"there is no model '{name}'; {listing(model_names)}{nearest(name, model_names)}")

@@ -98,7 +98,7 @@ class ConvexParts:
         folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
         if not folder.is_dir():
             parts = enumerate(self._make(mesh, kind))
-            write_folder(folder, {f"part_{index:03d}.obj": _obj_text(part).encode("ascii") for index, part in parts})
+            write_folder(folder, {f"part_{index:03d}.obj": obj_text(part).encode("ascii") for index, part in parts})
         return tuple(sorted(folder.glob("*.obj")))
 
     def _make(self, mesh: Mesh, kind: str) -> list[TriangleMesh]:
@@ -183,7 +183,8 @@ def _clipped_to(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
     return clipped
 
 
-def _obj_text(mesh: TriangleMesh) -> str:
+def obj_text(mesh: TriangleMesh) -> str:
+    """Returns the text of an OBJ file with nine significant digits."""
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
     lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.triangles]
     return "\n".join(lines) + "\n"
