@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Shows the state of a task from the changes that the server sends; page_protocol.py defines the messages.
 
+import { isSide, onPairMessage, tellPair } from "./pair_link.js";
 import { Plots } from "./plots.js";
 
 const RETRY_MS = 1000;
@@ -17,10 +18,10 @@ const OTHER_LOOPBACK_NAMES = { "127.0.0.1": "localhost", localhost: "127.0.0.1" 
 const element = (id) => document.getElementById(id);
 
 /** State received from the server; times are in seconds of the server's clock. */
-const state = { task: null, runs: new Map(), log: new Map(), samples: new Map(), joints: [], drawing: "", viewer: "", record: { title: "", omissions: [], marks: [] }, offset_s: 0, selected: null, view_s: null };
+const state = { task: null, runs: new Map(), log: new Map(), samples: new Map(), joints: [], drawing: "", viewer: "", record: { title: "", omissions: [], marks: [] }, offset_s: 0, selected: null, view_s: null, pair_s: 0 };
 const rows = new Map(); // rows of the time line, keyed by state path
 const bars = new Map(); // bars of the time line, keyed by run index
-const plots = new Plots(element("plots"), showCursor);
+const plots = new Plots(element("plots"), (time_s) => { showCursor(time_s); tellPair({ cursor_s: time_s }); });
 
 function make(kind, className, text) {
   const made = document.createElement(kind);
@@ -87,6 +88,7 @@ function receive(message) {
   }
   if (isNewTask || message.log.length > 0) showLog();
   if (isNewTask || message.samples.length > 0) arePlotsOld = true;
+  if (isNewTask && message.task.phase !== "waiting") tellPair({ end_s: end_s() });
 }
 
 function merge(entries, changed, oldest) {
@@ -98,7 +100,7 @@ function merge(entries, changed, oldest) {
 }
 
 function connect() {
-  const address = new URL("live", location.href);
+  const address = new URL(`live${location.search}`, location.href);
   address.protocol = address.protocol.replace("http", "ws");
   const socket = new WebSocket(address);
   let isFirst = true;
@@ -109,12 +111,29 @@ function connect() {
       state.log.clear();
       element("connection").textContent = "";
     }
-    receive(JSON.parse(event.data));
+    const message = JSON.parse(event.data);
+    if (message.fault === undefined) { receive(message); return; }
+    socket.onclose = null;
+    setText("sentence", message.fault);
   };
   socket.onclose = () => {
     element("connection").textContent = "Connection lost. The page shows the last known state.";
     setTimeout(connect, RETRY_MS);
   };
+}
+
+/** Adds links to the other episodes of the experiment, if the address names an episode. */
+async function showRunLinks() {
+  const number = new URLSearchParams(location.search).get("episode");
+  if (number === null || isSide) return;
+  const answer = await fetch(`run.json?episode=${number}`);
+  const partners = answer.ok ? (await answer.json()).partners : [];
+  const links = partners.map((partner) => [`Side by side with ${partner.number} (${partner.method})`, `./?pair=${number},${partner.number}`]);
+  for (const [text, target] of [...links, ["All episodes", "./"]]) {
+    const link = make("a", "", text);
+    link.href = target;
+    element("run-links").append(link);
+  }
 }
 
 // ---- summary of the task -------------------------------------------------------------------------------------------
@@ -306,7 +325,7 @@ function showTimeLine() {
 
 function moveTimeLine() {
   if (state.task === null || state.task.phase === "waiting") return;
-  const elapsed_s = Math.max(1, sinceStart(state.task.end_s ?? now_s()), ...state.record.marks.map((mark) => mark.time_s ?? 0));
+  const elapsed_s = Math.max(1, sinceStart(state.task.end_s ?? now_s()), ...state.record.marks.map((mark) => mark.time_s ?? 0), state.pair_s);
   for (const [index, bar] of bars) {
     if (state.runs.get(index)?.end_s === null) bar.style.setProperty("--end", elapsed_s);
   }
@@ -375,10 +394,12 @@ for (const button of element("quantities").children) {
 element("time").addEventListener("mousemove", (event) => {
   plots.setCursor(timeAt(event));
   showCursor(timeAt(event));
+  tellPair({ cursor_s: timeAt(event) });
 });
 element("time").addEventListener("mouseleave", () => {
   plots.setCursor(state.view_s);
   showCursor(null);
+  tellPair({ cursor_s: null });
 });
 new ResizeObserver(() => plots.build()).observe(element("plots"));
 
@@ -398,6 +419,12 @@ function view(view_s) {
   showRuns();
   showState();
   showLog();
+}
+
+/** Shows a time as `view`, in both episodes of a pair. */
+function viewInPair(view_s) {
+  view(view_s);
+  tellPair({ view_s });
 }
 
 function end_s() {
@@ -440,7 +467,7 @@ function showNextFailure() {
   const next = failed.find((run) => state.view_s !== null && run.end_s > viewed_s()) ?? failed[0];
   if (next === undefined) return;
   select(next.index);
-  view(sinceStart(next.end_s));
+  viewInPair(sinceStart(next.end_s));
 }
 
 element("moment").addEventListener("input", () => {
@@ -448,11 +475,24 @@ element("moment").addEventListener("input", () => {
   if (state.task === null || state.task.phase === "waiting") return;
   const chosen_s = Number(element("moment").value); // before the selection is redrawn, which sets the slider
   select(null);
-  view(Math.min(chosen_s, end_s()));
+  viewInPair(Math.min(chosen_s, Math.max(end_s(), state.pair_s)));
 });
 element("play").addEventListener("click", togglePlaying);
 element("failure").addEventListener("click", showNextFailure);
 element("latest").addEventListener("click", () => { stopPlaying(); view(null); });
+
+onPairMessage(({ data, source }) => {
+  if (source !== window.parent || !isSide || state.task === null) return;
+  if (data.total_s !== undefined) {
+    state.pair_s = data.total_s;
+    moveTimeLine();
+  }
+  if (data.view_s !== undefined) view(data.view_s);
+  if (data.cursor_s !== undefined) {
+    plots.setCursor(data.cursor_s ?? state.view_s);
+    showCursor(data.cursor_s);
+  }
+});
 
 // ---- state ---------------------------------------------------------------------------------------------------------
 /** Returns the selected run, or else the latest running state, or else the latest ended state. */
@@ -526,7 +566,7 @@ function showLog() {
     return item;
   });
   const { omissions } = state.record;
-  if (omissions.length > 0) items.unshift(make("li", "empty", `Not in the record: ${omissions.join(", ")}.`));
+  if (omissions.length > 0) items.unshift(make("li", "empty", `Not shown: ${omissions.join(", ")}.`));
   replaceItems("log", items, run === undefined ? "No warning and no error." : "No warning and no error at this time.");
 }
 
@@ -562,8 +602,10 @@ element("world-switch").addEventListener("click", () => {
   showWorld(state.viewer);
 });
 
+document.body.classList.toggle("side", isSide);
 clearTimeLine();
 showWorld("");
+showRunLinks();
 showQuantities();
 connect();
 setInterval(showPlots, PLOT_PERIOD_MS);

@@ -276,7 +276,7 @@ def replay_address(tmp_path: Path) -> Iterator[str]:
 def test_a_record_is_replayed_and_scrubbed_in_a_browser(replay_address: str) -> None:
     with Chromium(replay_address) as browser:
         browser.shows("#sentence", f"The task failed with outcome 'gave_up'. B: {FAILURE}")
-        browser.shows("#log", "Not in the record: the world, the joints, the log.")
+        browser.shows("#log", "Not shown: the world, the joints, the log.")
         browser.shows("#graph .node.failed", "B")
         slider = "document.querySelector('#moment')"
         browser.evaluate(f"{slider}.value = 0.5; {slider}.dispatchEvent(new Event('input'))")

@@ -21,6 +21,7 @@ from modular_framework_simulation.viewer.web_server import free_port
 from modular_framework_testing.ros_session import until
 from modular_framework_ui.messages import MachineStatus
 from modular_framework_ui.page_server import PageServer
+from modular_framework_ui.page_source import PageSource
 from modular_framework_ui.task_model import TaskModel
 
 WEB = Path(__file__).parents[3] / "src" / "modular_framework_ui" / "web"
@@ -31,7 +32,7 @@ class Served:
 
     def __init__(self) -> None:
         self.model = TaskModel(time.monotonic, lambda: self.server.notify())
-        self.server = PageServer(WEB, self.model.changes_since, "127.0.0.1", free_port("127.0.0.1", 8970))
+        self.server = PageServer(WEB, PageSource(self.model.changes_since), "127.0.0.1", free_port("127.0.0.1", 8970))
         self.server.start()
 
     @property
@@ -142,6 +143,6 @@ def test_a_frozen_browser_delays_neither_the_model_nor_others_nor_the_end(served
 
 
 def test_a_port_that_is_taken_is_reported(served: Served) -> None:
-    second = PageServer(WEB, served.model.changes_since, "127.0.0.1", served.server.port)
+    second = PageServer(WEB, PageSource(served.model.changes_since), "127.0.0.1", served.server.port)
     with pytest.raises(OSError, match=str(served.server.port)):
         second.start()

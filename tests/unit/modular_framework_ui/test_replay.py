@@ -8,109 +8,22 @@ import json
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 import pytest
+from recorded_files import write_episode, write_task
 
-import smach
-from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.episode_settings import EpisodeSettings
-from modular_framework_benchmark.results.json_records import record_to_json
-from modular_framework_core.state_api.framework_state import FrameworkState
+from modular_framework_benchmark.records.episode import Span
 from modular_framework_core.task_constructor.machine_graph import MachineFrame
-from modular_framework_core.task_runner.record import TaskRecorder
-from modular_framework_core.task_runner.task_runner import TaskRun, write_record
+from modular_framework_simulation.viewer.web_server import free_port
 from modular_framework_ui.joint_history import JointSample
 from modular_framework_ui.page_server import PageServer
 from modular_framework_ui.recorded_episode import read_episode
 from modular_framework_ui.recorded_task import ReplayError
 from modular_framework_ui.replay import replayed_model
-from modular_framework_ui.replay_command import main, replay_server
+from modular_framework_ui.replay_command import main, replay_source
 from modular_framework_ui.task_state import Mark, Phase, StateRun, TaskChanges
 
 WEB = Path(__file__).parents[3] / "src" / "modular_framework_ui" / "web"
-BEGUN = 1000.0
-ORIGIN_S = 50.0
-"""ROS time at the start of the recording [s]."""
-
-
-class Clock:
-    """A clock that advances by a second per reading."""
-
-    def __init__(self, start_s: float) -> None:
-        self._now_s = start_s - 1.0
-
-    def __call__(self) -> float:
-        self._now_s += 1.0
-        return self._now_s
-
-
-class Step(FrameworkState):
-    """Gives a reason for failing on the first execution, if there is one."""
-
-    def __init__(self, reason: str = "") -> None:
-        super().__init__(output_keys=["chosen"])
-        self._next_reason = reason
-
-    def execute(self, userdata: Any) -> str:
-        userdata.chosen = 0.5
-        reason, self._next_reason = self._next_reason, ""
-        return self.fail(reason) if reason else self.succeed()
-
-
-def pick_machine() -> smach.StateMachine:
-    """A machine whose nested machine fails once and runs a second time."""
-    hold = smach.StateMachine(["held", "missed"])
-    both = smach.Concurrence(["good", "bad"], "bad", outcome_map={"good": {"A": "success"}})
-    with both:
-        smach.Concurrence.add("A", Step())
-        smach.Concurrence.add("B", Step())
-    with hold:
-        smach.StateMachine.add("Close", Step("no object"), {"success": "Lift", "fail": "missed"})
-        smach.StateMachine.add("Lift", Step(), {"success": "held", "fail": "missed"})
-    made = smach.StateMachine(["done", "gave_up"])
-    with made:
-        smach.StateMachine.add("Look", Step(), {"success": "Both", "fail": "gave_up"})
-        smach.StateMachine.add("Both", both, {"good": "Hold", "bad": "gave_up"})
-        smach.StateMachine.add("Hold", hold, {"held": "done", "missed": "Hold"})
-    return made
-
-
-def write_task(folder: Path) -> Path:
-    """Writes the record of a run in which each reading of a clock advances the clock by 1 s."""
-    recorder = TaskRecorder(clock=Clock(0.0), ros_clock=Clock(ORIGIN_S), locations={"Look": "pick.yaml:7:5"})
-    run = TaskRun("pick", pick_machine, recorder)
-    run.start()
-    assert run.wait(10.0)
-    return write_record(folder, BEGUN, run.result(), recorder.records(), recorder.machines())
-
-
-def write_episode(folder: Path, milestones: tuple[Span, ...] = ()) -> None:
-    write_task(folder / "task_records")
-    (folder / "recording.json").write_text(json.dumps({"origin_s": ORIGIN_S, "reports": []}))
-    times_s = [0.5 * number for number in range(40)]
-    velocities, efforts = [0.1] * len(times_s), [float("nan")] * len(times_s)
-    samples = {"time_s": times_s, "pan/position": times_s, "pan/velocity": velocities, "pan/effort": efforts}
-    pd.DataFrame(samples).to_parquet(folder / "trajectory.parquet")
-    tracked = {"time_s": times_s, "controller": "arm", "joint": "pan", "desired": [time + 0.01 for time in times_s]}
-    pd.DataFrame(tracked | {"actual": times_s}).to_parquet(folder / "tracking.parquet")
-    record = EpisodeRecord(
-        EpisodeSpec(3, {"planner": "rrt"}, 2, 7, EpisodeSettings()),
-        EpisodeStatus.FAILED,
-        outcome="done",
-        cause="the object fell",
-        begun=BEGUN,
-        wall_s=20.0,
-        simulated_s=20.0,
-        metrics={},
-        spans=milestones,
-    )
-    (folder / "episode.json").write_text(record_to_json(record))
-    (folder / "log.txt").write_text(
-        f"[WARN] [{BEGUN - 9.0:.6f}, 8.0]: of the warm-up run\n"
-        f"\x1b[33m[ WARN] [{BEGUN + 2.5:.6f}, 52.500000]: slow\x1b[0m\n[INFO] [1.0]: no\nplain text\n"
-    )
 
 
 def replayed(path: Path) -> TaskChanges:
@@ -205,7 +118,8 @@ def test_an_incomplete_file_of_an_episode_is_refused_or_left_out(tmp_path: Path,
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[PageServer]:
-    server = replay_server(write_task(tmp_path), WEB, 8980)
+    source = replay_source(str(write_task(tmp_path)))
+    server = PageServer(WEB, source, "127.0.0.1", free_port("127.0.0.1", 8980))
     server.start()
     yield server
     server.close()

@@ -40,6 +40,15 @@ def changes_text(changes: TaskChanges) -> str:
     return json.dumps(values)
 
 
+def fault_text(reason: str) -> str:
+    """Returns the only message of a connection without a task, with the reason.
+
+    Args:
+        reason: Reason for the page, as a sentence.
+    """
+    return json.dumps({"fault": reason})
+
+
 def _sample(index: int, sample: JointSample) -> dict[str, Any]:
     """Returns a sample with a list per quantity; the values are rounded, because samples are most of the messages."""
     values = zip(Quantity, sample.values, strict=True)

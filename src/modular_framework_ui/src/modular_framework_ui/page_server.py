@@ -11,9 +11,9 @@ import asyncio
 import contextlib
 import http
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qsl, urlsplit
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
@@ -22,16 +22,23 @@ from websockets.http11 import Request, Response
 
 from modular_framework_simulation.viewer.access import Access
 from modular_framework_simulation.viewer.page_connections import PageConnections
-from modular_framework_ui.page_protocol import changes_text
-from modular_framework_ui.task_state import TaskChanges
+from modular_framework_ui.page_protocol import changes_text, fault_text
+from modular_framework_ui.page_source import PAIR_PAGE, RUN_PAGE, TASK_PAGE, PageSource, Query
+from modular_framework_ui.recorded_task import ReplayError
 
-LIVE_PATH = "/live"
+LIVE_PATH, TABLE_PATH = "/live", "/run.json"
+_HTML, _SCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 FILES = {
-    "/": ("index.html", "text/html; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/plots.js": ("plots.js", "text/javascript; charset=utf-8"),
+    TASK_PAGE: ("index.html", _HTML),
+    RUN_PAGE: ("episodes.html", _HTML),
+    PAIR_PAGE: ("pair.html", _HTML),
+    "/page.js": ("page.js", _SCRIPT),
+    "/plots.js": ("plots.js", _SCRIPT),
+    "/pair_link.js": ("pair_link.js", _SCRIPT),
+    "/episodes.js": ("episodes.js", _SCRIPT),
+    "/pair.js": ("pair.js", _SCRIPT),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
-    "/uPlot.js": ("uPlot/uPlot.iife.min.js", "text/javascript; charset=utf-8"),
+    "/uPlot.js": ("uPlot/uPlot.iife.min.js", _SCRIPT),
     "/uPlot.css": ("uPlot/uPlot.min.css", "text/css; charset=utf-8"),
 }
 """File name and MIME type, keyed by URL path; the server serves no other files."""
@@ -48,14 +55,14 @@ class PageServer:
 
     Args:
         folder: Folder with the files of the page.
-        changes_since: Function that returns the changes after a revision.
+        source: Contents of the page.
         host: Address of the server.
         port: Unused port.
     """
 
-    def __init__(self, folder: Path, changes_since: Callable[[int], TaskChanges], host: str, port: int) -> None:
+    def __init__(self, folder: Path, source: PageSource, host: str, port: int) -> None:
         self._files = {path: ((folder / name).read_bytes(), kind) for path, (name, kind) in FILES.items()}
-        self._changes_since = changes_since
+        self._source = source
         self.host, self.port = host, port
         self._access, self._connections = Access(), PageConnections()
         self._loop = asyncio.new_event_loop()
@@ -123,12 +130,18 @@ class PageServer:
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
         """Returns the response to an HTTP request; None for the handshake of the WebSocket."""
-        path = request.path.partition("?")[0]
+        path, query = urlsplit(request.path).path, _query(request)
         if path == LIVE_PATH:
             return None
-        if path not in self._files:
+        if path == TABLE_PATH:
+            try:
+                content, kind = self._source.table(query).encode(), "application/json"
+            except ReplayError as error:
+                return connection.respond(http.HTTPStatus.NOT_FOUND, f"{error}\n")
+        elif path in self._files:
+            content, kind = self._files[self._source.page(query) if path == TASK_PAGE else path]
+        else:
             return connection.respond(http.HTTPStatus.NOT_FOUND, f"there is no file {path}\n")
-        content, kind = self._files[path]
         headers = {
             "Content-Type": kind,
             "Content-Length": str(len(content)),
@@ -146,14 +159,20 @@ class PageServer:
         self._changed.add(changed)
         reader = asyncio.create_task(_refuse_messages(connection, changed))
         try:
+            assert connection.request is not None
+            query = _query(connection.request)
+            changes_since = await asyncio.to_thread(self._source.changes, query)
             revision = 0
             while True:
                 await changed.wait()
                 changed.clear()
-                changes = self._changes_since(revision)
+                changes = changes_since(revision)
                 revision = changes.revision
                 await connection.send(changes_text(changes))
                 await asyncio.sleep(MIN_PERIOD_S)
+        except ReplayError as error:
+            with contextlib.suppress(ConnectionClosed):
+                await connection.send(fault_text(str(error)))
         except ConnectionClosed:
             pass
         finally:
@@ -177,11 +196,18 @@ async def _refuse_messages(connection: ServerConnection, changed: asyncio.Event)
         changed.set()
 
 
+def _query(request: Request) -> Query:
+    return dict(parse_qsl(urlsplit(request.path).query))
+
+
 def _content_policy(host: str) -> str:
-    """Returns the content security policy: files of this server, and frames of this computer for the world view."""
+    """Returns the content security policy: files of this server, and frames of this computer for the world view.
+
+    Only pages of this server may contain its pages as frames; the page of a pair does.
+    """
     name = host.rpartition(":")[0]
     frames = " ".join(f"http://{each}:*" for each in (name, "localhost", "127.0.0.1"))
     return (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
-        f"connect-src 'self' ws://{host}; frame-src {frames}; frame-ancestors 'none'; base-uri 'none'"
+        f"connect-src 'self' ws://{host}; frame-src 'self' {frames}; frame-ancestors 'self'; base-uri 'none'"
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,9 @@ class JointTrack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedEpisode:
-    """Record of an episode, or of a task outside of an experiment. Times are in seconds since the start of the task.
+    """Record of an episode, or of a task outside of an experiment.
+
+    Times are in seconds since the start of the task, real or simulated.
 
     Attributes:
         title: Description of the episode.
@@ -72,17 +74,18 @@ class RecordedEpisode:
     omissions: tuple[str, ...] = ()
 
 
-def read_episode(path: Path) -> RecordedEpisode:
+def read_episode(path: Path, *, in_simulated_time: bool = False) -> RecordedEpisode:
     """Returns the record of an episode.
 
     Args:
         path: Folder of an episode, or file that `run_task` wrote.
+        in_simulated_time: Whether times are simulated; otherwise real.
 
     Raises:
-        ReplayError: There is no record of a task, or a file of the episode cannot be read.
+        ReplayError: There is no record of a task, a file of the episode cannot be read, or simulated times are missing.
     """
     try:
-        return _read_episode(path)
+        return _read_episode(path, in_simulated_time)
     except ReplayError:
         raise
     except (ValueError, KeyError, TypeError) as error:
@@ -91,7 +94,7 @@ def read_episode(path: Path) -> RecordedEpisode:
         ) from error
 
 
-def _read_episode(path: Path) -> RecordedEpisode:
+def _read_episode(path: Path, in_simulated_time: bool) -> RecordedEpisode:
     if not path.is_dir():
         task = read_task(path)
         return RecordedEpisode(
@@ -107,10 +110,15 @@ def _read_episode(path: Path) -> RecordedEpisode:
             f"{path}: no record of a task in {TASK_RECORDS}; allowed: the folder of an episode in mode task whose "
             "recording was not pruned"
         )
-    return _episode_of(path, read_task(records[-1]))
+    task = read_task(records[-1])
+    log = _read_log(path / _LOG, task.begun)
+    if not in_simulated_time:
+        return _episode_of(path, task, log)
+    simulated_log = tuple(replace(line, time_s=task.to_simulated_time(line.time_s)) for line in log)
+    return _episode_of(path, task.in_simulated_time(), simulated_log)
 
 
-def _episode_of(folder: Path, task: RecordedTask) -> RecordedEpisode:
+def _episode_of(folder: Path, task: RecordedTask, log: tuple[LogLine, ...]) -> RecordedEpisode:
     summary, origin_s = _read_summary(folder), read_recording(folder).get("origin_s")
     joints = _joints_of(folder, task, origin_s)
     missing = [
@@ -125,7 +133,7 @@ def _episode_of(folder: Path, task: RecordedTask) -> RecordedEpisode:
         reason=str(summary["cause"]) if summary else task.reason,
         milestones=_milestones(summary, task, origin_s),
         joints=joints,
-        log=_read_log(folder / _LOG, task.begun),
+        log=log,
         omissions=("the world", *(name for name, is_missing in missing if is_missing), *_missing_in(task)),
     )
 

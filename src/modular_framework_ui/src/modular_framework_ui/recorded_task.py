@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,43 @@ class RecordedTask:
         Args:
             ros_s: Readings of the ROS clock, shape (n,) [s].
         """
+        known_ros, known_s = self._moments()
+        return np.interp(ros_s, known_ros, known_s) if len(known_s) else np.full(np.shape(ros_s), np.nan)
+
+    def to_simulated_time(self, time_s: float) -> float:
+        """Converts a time since the start of the task [s] to simulated time since the start of the task [s].
+
+        Raises:
+            ReplayError: The record has no simulated times.
+        """
+        known_ros, known_s = self._moments()
+        if not len(known_s):
+            raise ReplayError(
+                f"{self.name}: the record has no simulated times; allowed: records with simulated time in a pair, "
+                "and any record by itself"
+            )
+        start, moment = np.interp([0.0, time_s], known_s, known_ros)
+        return float(moment - start)
+
+    def in_simulated_time(self) -> RecordedTask:
+        """Returns the record with simulated times of its states.
+
+        Raises:
+            ReplayError: The record has no simulated times.
+        """
+        convert = self.to_simulated_time
+        states = tuple(
+            replace(
+                state,
+                started_s=convert(state.started_s),
+                ended_s=None if state.ended_s is None else convert(state.ended_s),
+            )
+            for state in self.states
+        )
+        return replace(self, states=states)
+
+    def _moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns ascending readings of the ROS clock and times since the start of the task [s]; empty if unknown."""
         moments: list[tuple[float, float]] = []
         for state in self.states:
             moments += [
@@ -72,11 +109,11 @@ class RecordedTask:
                 if ros is not None and time_s is not None
             ]
         if not moments:
-            return np.full(np.shape(ros_s), np.nan)
+            return np.empty(0), np.empty(0)
         known_ros, known_s = np.array(sorted(moments)).T
         known_ros = np.concatenate([[known_ros[0] - _FAR_S], known_ros, [known_ros[-1] + _FAR_S]])
         known_s = np.concatenate([[known_s[0] - _FAR_S], known_s, [known_s[-1] + _FAR_S]])
-        return np.interp(ros_s, known_ros, np.maximum.accumulate(known_s))
+        return known_ros, np.maximum.accumulate(known_s)
 
 
 def read_task(path: Path) -> RecordedTask:

@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serves the page of a recorded episode; needs no ROS master."""
+"""Serves the page of a recorded episode, or of the episodes of an experiment; needs no ROS master."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from urllib.parse import urlencode
 
-from modular_framework_core.task_constructor import machine_graph
-from modular_framework_core.task_constructor.machine_graph import GraphError
 from modular_framework_simulation.viewer.web_server import AddressError, free_port
 from modular_framework_ui.page_server import PageServer
+from modular_framework_ui.page_source import PageSource
 from modular_framework_ui.recorded_episode import read_episode
+from modular_framework_ui.recorded_run import read_run
 from modular_framework_ui.recorded_task import ReplayError
-from modular_framework_ui.replay import replayed_model
+from modular_framework_ui.replayed_run import ReplayedRun, drawn_model
 
 _HOST, _FIRST_PORT = "127.0.0.1", 8090
+_TASK_SUFFIX = ".json"
+"""Suffix of a record by `run_task`."""
 
 
 def main(arguments: Sequence[str], web_folder: Path) -> int:
@@ -30,38 +33,59 @@ def main(arguments: Sequence[str], web_folder: Path) -> int:
     Returns:
         Exit code 2: the record cannot be replayed, or the page cannot be served.
     """
-    parser = argparse.ArgumentParser(prog="page", description="Shows a running task or a record in a browser.")
-    parser.add_argument(
-        "--replay", required=True, type=Path, metavar="RECORD", help="folder of an episode, or record by run_task"
-    )
-    parser.add_argument("--port", type=int, default=_FIRST_PORT, help="port; if in use, the next free port")
-    chosen = parser.parse_args(arguments)
+    chosen = _parser().parse_args(arguments)
+    query = _query(chosen)
     try:
-        server = replay_server(chosen.replay, web_folder, chosen.port)
+        source = replay_source(chosen.replay, chosen.experiment, query)
+        server = PageServer(web_folder, source, _HOST, free_port(_HOST, chosen.port))
         server.start()
-    except (ReplayError, AddressError, GraphError, OSError) as error:
+    except (ReplayError, AddressError, OSError) as error:
         print(f"page: {error}", file=sys.stderr)
         return 2
-    print(f"page: open {server.address} in a browser; Ctrl-C ends the replay", flush=True)
+    address = f"{server.address}?{urlencode(query, safe=',')}" if query else server.address
+    print(f"page: open {address} in a browser; Ctrl-C ends the replay", flush=True)
     threading.Event().wait()
     return 0
 
 
-def replay_server(record: Path, web_folder: Path, port: int) -> PageServer:
-    """Returns a server of the page of a record.
+def replay_source(record: str, experiment: str | None = None, query: Mapping[str, str] | None = None) -> PageSource:
+    """Returns the contents of the page of a record.
 
     Args:
-        record: Folder of an episode, or file that `run_task` wrote.
-        web_folder: Folder with the files of the page.
-        port: Port; if in use, one of the next ports.
+        record: Folder of an episode, file that `run_task` wrote, or result database.
+        experiment: Name of the experiment of a database; None for its only experiment.
+        query: Query of the address to open, which is checked.
 
     Raises:
-        ReplayError: The record cannot be read.
-        GraphError: The state machine cannot be drawn.
-        AddressError: No port is free.
+        ReplayError: The record cannot be read, or the query does not fit the record.
     """
-    model = replayed_model(read_episode(record))
-    frame = model.frame()
-    if frame is not None:
-        model.note_drawing(machine_graph.render(machine_graph.draw(frame).source, "svg").decode())
-    return PageServer(web_folder, model.changes_since, _HOST, free_port(_HOST, port))
+    if Path(record).is_dir() or record.endswith(_TASK_SUFFIX):
+        if query or experiment:
+            raise ReplayError(f"{record}: is a single episode; allowed with the other options: a result database")
+        return PageSource(drawn_model(read_episode(Path(record))).changes_since)
+    source = ReplayedRun(read_run(record, experiment))
+    source.table(query or {})
+    return source
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="page", description="Shows a running task or a record in a browser.")
+    parser.add_argument(
+        "--replay", required=True, metavar="RECORD", help="folder of an episode, record by run_task, or result database"
+    )
+    parser.add_argument("--port", type=int, default=_FIRST_PORT, help="port; if in use, the next free port")
+    parser.add_argument("--experiment", metavar="NAME", help="experiment of the database; default: its only experiment")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--episode", type=int, metavar="N", help="open this episode of the database")
+    shown.add_argument("--pair", type=int, nargs=2, metavar="N", help="open these episodes side by side")
+    shown.add_argument("--failure-class", metavar="CLASS", help="list only the episodes of this failure class")
+    return parser
+
+
+def _query(chosen: argparse.Namespace) -> dict[str, str]:
+    """Returns the query of the address to open."""
+    if chosen.episode is not None:
+        return {"episode": str(chosen.episode)}
+    if chosen.pair is not None:
+        return {"pair": ",".join(map(str, chosen.pair))}
+    return {} if chosen.failure_class is None else {"failure_class": chosen.failure_class}

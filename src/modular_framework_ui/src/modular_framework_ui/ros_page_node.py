@@ -17,6 +17,7 @@ from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_simulation.viewer.web_server import AddressError, free_port
 from modular_framework_ui.page_server import PageServer
+from modular_framework_ui.page_source import PageSource
 from modular_framework_ui.ros_task_topics import TaskTopics
 from modular_framework_ui.task_model import TaskModel
 
@@ -39,7 +40,7 @@ class PageNode:
     def __init__(self, folder: Path, host: str, port: int) -> None:
         self._changed = threading.Event()
         self._model = TaskModel(time.monotonic, self._note_change)
-        self._server = PageServer(folder, self._model.changes_since, host, port)
+        self._server = PageServer(folder, PageSource(self._model.changes_since), host, port)
         self._frame: MachineFrame | None = None
 
     @property
@@ -90,7 +91,7 @@ class PageNode:
 
 
 def main() -> int:
-    """Runs the node, or with `--replay RECORD` the page of a record.
+    """Runs the node, or with `--replay RECORD` the page of a record or of an experiment.
 
     Returns:
         Exit code: 0 after a regular shutdown, 1 if the page cannot be served, 2 if the record cannot be replayed.
