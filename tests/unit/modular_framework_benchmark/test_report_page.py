@@ -18,7 +18,7 @@ from reported_experiment import MILESTONES, TEXT, ReportedExperiment
 
 from modular_framework_benchmark.commands.report_command import main
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_benchmark.reports.failure_groups import Link, episode_links
+from modular_framework_benchmark.reports.failure_groups import EpisodeFiles, Link
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode
 from modular_framework_benchmark.reports.time_figures import timelines_figure
 from modular_framework_benchmark.results.database import open_database
@@ -137,10 +137,29 @@ def test_each_failure_is_linked_to_its_files_relative_to_the_page(page: Page) ->
 def test_an_episode_with_a_record_of_its_task_has_the_command_that_replays_it(tmp_path: Path) -> None:
     for folder in ("episodes/1 a/task_records", "episodes/2"):
         (tmp_path / folder).mkdir(parents=True)
-    links = episode_links("episodes/1 a", tmp_path, tmp_path / "report")
+    files = EpisodeFiles(
+        database="/lab/my picks.db", experiment="picks", database_folder=tmp_path, report_folder=tmp_path / "report"
+    )
+    opened = "rosrun modular_framework_ui page --replay '/lab/my picks.db' --experiment picks"
+    assert files.links(1, "episodes/1 a")[-1] == Link("replay", command=f"{opened} --episode 1")
+    assert files.class_link("no plan") == Link("replay", command=f"{opened} --failure-class 'no plan'")
+    assert [link.text for link in files.links(2, "episodes/2")] == ["folder"] and files.class_link("") is None
+    on_server = replace(files, database="postgresql://lab:***@host/picks")
     folder = tmp_path.resolve() / "episodes" / "1 a"
-    assert links[-1] == Link("replay", command=f"rosrun modular_framework_ui page --replay '{folder}'")
-    assert [link.text for link in episode_links("episodes/2", tmp_path, tmp_path / "report")] == ["folder"]
+    command = f"rosrun modular_framework_ui page --replay '{folder}'"
+    assert on_server.links(1, "episodes/1 a")[-1] == Link("replay", command=command)
+    assert on_server.class_link("no plan") is None
+
+
+def test_a_failure_class_has_the_command_that_lists_its_episodes_with_records(tmp_path: Path) -> None:
+    experiment = replace(SMALL, with_progress=True)
+    database = experiment.store(tmp_path / "results.db")
+    for folder in (tmp_path / f"{experiment.name}_files").iterdir():
+        (folder / "task_records").mkdir()
+    page = Page.of(database, tmp_path / "report.html")
+    found = [code.text_content() for code in page.tree.xpath("//details[summary/strong='slipped']/p//code")]
+    command = f"{database} --experiment {experiment.name} --failure-class slipped"
+    assert set(found) == {f"rosrun modular_framework_ui page --replay {command}"}
 
 
 def test_the_episodes_of_the_timelines_are_linked_to_their_files_successes_too(page: Page) -> None:

@@ -45,6 +45,59 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeFiles:
+    """Files of the episodes of an experiment, and the commands that replay the episodes.
+
+    Attributes:
+        database: SQLite file; label with "://" for a server.
+        experiment: Name of the experiment.
+        database_folder: Base of the episodes' folders.
+        report_folder: Folder of the report, the base of its links.
+    """
+
+    database: str
+    experiment: str
+    database_folder: Path
+    report_folder: Path
+
+    def links(self, number: int, folder: str) -> tuple[Link, ...]:
+        """Returns links to the folder of an episode and its logs, videos and bags, and the command that replays it.
+
+        There are no links to a folder outside the base. The database of a server is reached with a password, which a
+        report must not contain, so that the command then names the folder.
+
+        Args:
+            number: Number of the episode.
+            folder: Folder of the episode, relative to `database_folder`; "" for none.
+        """
+        root = self.database_folder.resolve()
+        path = (root / folder).resolve()
+        if not folder or not path.is_relative_to(root) or not path.is_dir():
+            return ()
+        files = [item for item in sorted(path.iterdir()) if item.suffix in _KIND_OF_SUFFIX and item.is_file()]
+        links = [Link("folder", _relative(path, self.report_folder) + "/")]
+        links += [
+            Link(f"{_KIND_OF_SUFFIX[item.suffix]} {item.name}", _relative(item, self.report_folder))
+            for item in files[:MAX_FILES]
+        ]
+        if (path / TASK_RECORDS).is_dir():
+            command = self._run_command("--episode", str(number)) or f"{REPLAY_COMMAND} {shlex.quote(str(path))}"
+            links.append(Link("replay", command=command))
+        return tuple(links)
+
+    def class_link(self, failure_class: str) -> Link | None:
+        """Returns the command that lists the episodes of a failure class; None without a class or with a server."""
+        command = self._run_command("--failure-class", failure_class)
+        return Link("replay", command=command) if failure_class and command else None
+
+    def _run_command(self, *options: str) -> str:
+        """Returns the command that opens the experiment on the page; "" with a server."""
+        if "://" in self.database:
+            return ""
+        return f"{REPLAY_COMMAND} {shlex.join([self.database, '--experiment', self.experiment, *options])}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FailedEpisode:
     """An unsuccessful episode.
 
@@ -78,6 +131,7 @@ class FailureGroup:
         episodes: Number of episodes.
         shown: First episodes of the group.
         by_method: Number of episodes, keyed by method.
+        replay: Command that lists the episodes of the class on the page; None if no shown episode has a record.
     """
 
     failure_class: str
@@ -86,6 +140,7 @@ class FailureGroup:
     episodes: int
     shown: tuple[FailedEpisode, ...]
     by_method: Mapping[str, int]
+    replay: Link | None
 
     @property
     def caption(self) -> str:
@@ -112,13 +167,12 @@ class Failures:
     episodes: int
 
 
-def group_failures(results: ExperimentResults, database_folder: Path, report_folder: Path) -> Failures:
+def group_failures(results: ExperimentResults, files: EpisodeFiles) -> Failures:
     """Returns the failures of an experiment by cause, the most frequent first.
 
     Args:
         results: Finished episodes.
-        database_folder: Base of the episodes' folders.
-        report_folder: Folder of the report, the base of its links.
+        files: Files of the episodes.
     """
     table = results.episodes[results.episodes["status"] != EpisodeStatus.SUCCEEDED.value]
     causes = {text: _NUMBER_PATTERN.sub("…", text) for text in table["cause"].astype(str).unique()}
@@ -126,7 +180,7 @@ def group_failures(results: ExperimentResults, database_folder: Path, report_fol
     keyed = table.assign(group=table["cause"].astype(str).map(causes), **{FAILURE_CLASS: classes})
     groups = list(keyed.groupby([FAILURE_CLASS, "status", "group"], sort=False))
     groups.sort(key=lambda item: -len(item[1]))
-    finder = _EpisodeReader(results, database_folder, report_folder)
+    finder = _EpisodeReader(results, files)
     failure_groups = tuple(finder.group(keys, rows) for keys, rows in groups)
     return Failures(
         _by_class(failure_groups),
@@ -149,21 +203,23 @@ def _by_class(groups: Sequence[FailureGroup]) -> dict[str, dict[str, int]]:
 @dataclass(frozen=True, slots=True)
 class _EpisodeReader:
     results: ExperimentResults
-    database_folder: Path
-    report_folder: Path
+    files: EpisodeFiles
 
     def group(self, keys: tuple[object, ...], rows: pd.DataFrame) -> FailureGroup:
         failure_class, status, pattern = map(str, keys)
         compared = self.results.description.compared
         counts = rows[compared].astype(str).value_counts()
         causes = rows["cause"].astype(str).unique()
+        shown = tuple(self.episode(row) for row in rows.head(MAX_EPISODES).to_dict("records"))
+        has_record = any(link.command for episode in shown for link in episode.links)
         return FailureGroup(
             failure_class,
             (str(causes[0]) if len(causes) == 1 else pattern) or "no cause was recorded",
             EpisodeStatus(status),
             len(rows),
-            tuple(self.episode(row) for row in rows.head(MAX_EPISODES).to_dict("records")),
+            shown,
             {str(method): int(count) for method, count in counts.items()},
+            self.files.class_link(failure_class) if has_record else None,
         )
 
     def episode(self, row: Mapping[object, object]) -> FailedEpisode:
@@ -176,32 +232,8 @@ class _EpisodeReader:
             seed=int(str(row["seed"])),
             status=EpisodeStatus(str(row["status"])),
             cause=str(row["cause"]),
-            links=episode_links(str(row["folder"] or ""), self.database_folder, self.report_folder),
+            links=self.files.links(int(str(row["number"])), str(row["folder"] or "")),
         )
-
-
-def episode_links(folder: str, database_folder: Path, report_folder: Path) -> tuple[Link, ...]:
-    """Returns links to the folder of an episode and its logs, videos and bags, and the command that replays it.
-
-    There are no links to a folder outside the base.
-
-    Args:
-        folder: Folder of the episode, relative to `database_folder`; "" for none.
-        database_folder: Folder of the database.
-        report_folder: Folder of the report.
-    """
-    root = database_folder.resolve()
-    path = (root / folder).resolve()
-    if not folder or not path.is_relative_to(root) or not path.is_dir():
-        return ()
-    files = [item for item in sorted(path.iterdir()) if item.suffix in _KIND_OF_SUFFIX and item.is_file()]
-    file_links = [
-        Link(f"{_KIND_OF_SUFFIX[item.suffix]} {item.name}", _relative(item, report_folder))
-        for item in files[:MAX_FILES]
-    ]
-    replay = [Link("replay", command=f"{REPLAY_COMMAND} {shlex.quote(str(path))}")]
-    has_task = (path / TASK_RECORDS).is_dir()
-    return (Link("folder", _relative(path, report_folder) + "/"), *file_links, *(replay if has_task else ()))
 
 
 def _relative(path: Path, report_folder: Path) -> str:

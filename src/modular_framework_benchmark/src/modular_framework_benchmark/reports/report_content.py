@@ -18,7 +18,7 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.perturbation import PERTURBATION
 from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.distribution_figures import distribution_figures
-from modular_framework_benchmark.reports.failure_groups import Failures, failures_figure, group_failures
+from modular_framework_benchmark.reports.failure_groups import EpisodeFiles, Failures, failures_figure, group_failures
 from modular_framework_benchmark.reports.figure_style import NamedFigure
 from modular_framework_benchmark.reports.robustness_figures import robustness_figures
 from modular_framework_benchmark.reports.run_record import (
@@ -172,10 +172,16 @@ def gather_content(results: ExperimentResults, source: ReportSource, mean_interv
     description = results.description
     analysis = analyse(results, mean_intervals=mean_intervals)
     levels, robustness = _success_by_level(results), _robustness(results)
-    chosen = choose_episodes(results, source.database_folder, source.report_folder)
+    files = EpisodeFiles(
+        database=source.database,
+        experiment=results.description.name,
+        database_folder=source.database_folder,
+        report_folder=source.report_folder,
+    )
+    chosen = choose_episodes(results, files)
     timelines = source.spans_of([item.number for item in chosen])
     spans = summarise_spans(results, source.span_totals, timelines)
-    failures = group_failures(results, source.database_folder, source.report_folder)
+    failures = group_failures(results, files)
     recorded = recorded_values(source.snapshots)
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods

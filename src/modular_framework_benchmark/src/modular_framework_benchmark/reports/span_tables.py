@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
-from modular_framework_benchmark.reports.failure_groups import Link, episode_links
+from modular_framework_benchmark.reports.failure_groups import EpisodeFiles, Link
 from modular_framework_benchmark.statistics.observations import methods_of, other_factors
 
 MAX_TIMELINES = 12
@@ -63,17 +62,14 @@ class ChosenEpisode:
     links: tuple[Link, ...]
 
 
-def choose_episodes(
-    results: ExperimentResults, database_folder: Path, report_folder: Path
-) -> tuple[ChosenEpisode, ...]:
+def choose_episodes(results: ExperimentResults, files: EpisodeFiles) -> tuple[ChosenEpisode, ...]:
     """Returns a success of median duration and the first failure of the most frequent cause for each method.
 
     At most MOST_TIMELINES episodes are returned, from the first methods.
 
     Args:
         results: Finished episodes.
-        database_folder: Base of the episodes' folders.
-        report_folder: Folder of the report, the base of its links.
+        files: Files of the episodes.
     """
     episodes = results.episodes
     rows: list[pd.Series] = []
@@ -93,7 +89,7 @@ def choose_episodes(
             str(row[results.description.compared]),
             EpisodeStatus(str(row["status"])),
             bool(row.get(COLD_START, False)),
-            episode_links(str(row["folder"] or ""), database_folder, report_folder),
+            files.links(int(row["number"]), str(row["folder"] or "")),
         )
         for row in rows[:MAX_TIMELINES]
     )
