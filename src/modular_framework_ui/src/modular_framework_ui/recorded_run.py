@@ -12,7 +12,7 @@ from typing import Any
 from modular_framework_benchmark.metrics.recording_files import TASK_RECORDS
 from modular_framework_benchmark.records.results import FAILURE_CLASS, ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
-from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.report_source import open_experiment
 from modular_framework_benchmark.results.errors import ResultsError
 from modular_framework_ui.recorded_task import ReplayError
 
@@ -113,7 +113,7 @@ def read_run(target: str, experiment: str | None) -> RecordedRun:
         ReplayError: The database cannot be read, or lacks the experiment.
     """
     try:
-        with open_source(target, experiment) as opened:
+        with open_experiment(target, experiment) as opened:
             return run_of(opened.results, opened.database.folder)
     except (ReportError, ResultsError) as error:
         raise ReplayError(str(error)) from error
