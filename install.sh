@@ -398,7 +398,7 @@ main() {
       find_underlay
       examine_build
       source_workspace
-      exec rosrun modular_framework_api doctor "$@"
+      exec rosrun modular_framework_setup doctor "$@"
       ;;
     exec)
       set_up

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from catkin_pkg.packages import find_packages
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "layers"))
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tests" / "layers"))
 
 from architecture_drawing import dot_text, draw, is_up_to_date, without_shortcuts  # noqa: E402
 from imports_of_tests import imports_of_tests, python_files  # noqa: E402
@@ -237,3 +240,10 @@ def test_imports_of_packages_and_of_modules_beside_the_file_pass(tmp_path: Path)
         (tmp_path / name / "fault_table.py").touch()
     (tmp_path / "benchmarks" / "faults").write_text("import fault_table\nimport json\nfrom house.roof import tiles\n")
     assert not list(imports_of_tests(tmp_path, ["benchmarks/faults"]))
+
+
+def test_no_packages_depend_on_each_other_in_a_circle() -> None:
+    """Catkin builds such packages one at a time, and ends with an internal error if it builds all of them."""
+    packages = find_packages(str(ROOT / "src")).values()
+    graph = {package.name: {item.name for item in package.build_depends + package.exec_depends} for package in packages}
+    assert len(tuple(TopologicalSorter(graph).static_order())) >= len(packages) > 1

@@ -105,7 +105,7 @@ def test_the_faults_of_the_config_package_are_findings(tmp_path: Path, monkeypat
         file.write_text(text.replace(old, new, 1))
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}")
     monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{free_port()}")
-    command = ["rosrun", "modular_framework_api", "doctor"]
+    command = ["rosrun", "modular_framework_setup", "doctor"]
     run = subprocess.run([*command, "moveit_config_package:=lab_config"], capture_output=True, text=True, check=False)
     assert run.returncode == 1 and "FAULT  lab_config:" in run.stdout and "wrist_9_link" in run.stdout, run.stderr
     run = subprocess.run(command, capture_output=True, text=True, check=False)
