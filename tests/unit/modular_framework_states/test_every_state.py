@@ -27,7 +27,7 @@ STATES = ROOT / "src" / "modular_framework_states" / "src" / "modular_framework_
 EXAMPLES = ROOT / "docs" / "examples"
 TEMPLATES = ROOT / "src/modular_framework_core/templates"
 CATALOGUE = StateCatalogue([STATES, EXAMPLES])
-METHODS = ("my_grasp_method", "my_planner", "my_policy")  # examples that are no states
+METHODS = ("my_grasp_method", "my_planner", "my_planner_table", "my_policy")  # examples that are no states
 NAMES = [name for name in CATALOGUE.names() if not name.startswith("test_") and name not in METHODS]
 EXPECTED = {
     "wait_for_signal",
