@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import sys
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -93,6 +95,29 @@ def test_a_daemon_with_an_empty_environment_counts_also_after_its_end(start: Sta
     start(f"{DAEMON}\nstart_daemon({text!r})\ninput()", *COMMAND)
     until(done.is_file, "the daemon's computation")
     assert BUSY_S - TICKS_S <= processor_time_s(os.getpid()) < BUSY_S + 1.0
+
+
+def test_a_process_that_ends_between_two_readings_counts(
+    start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pid, go_on = tmp_path / "pid", tmp_path / "go_on"
+    wait = f"while not os.path.exists({str(go_on)!r}): pass"
+    text = f"{BUSY}\nimport os\nopen({str(pid)!r}, 'w').write(f'{{os.getpid()}}.')\n{wait}"
+    start(f"{DAEMON}\nstart_daemon({text!r})\ninput()", *COMMAND)
+    until(lambda: pid.is_file() and pid.read_text().endswith("."), "the daemon's computation")
+    daemon = psutil.Process(int(pid.read_text().strip(".")))
+    cpu_times = psutil.Process.cpu_times
+
+    @functools.wraps(cpu_times)
+    def read_and_let_the_daemon_end(process: psutil.Process) -> Any:
+        times = cpu_times(process)
+        if not go_on.exists():
+            go_on.touch()
+            until(lambda: not daemon.is_running(), "the end of the daemon")
+        return times
+
+    monkeypatch.setattr(psutil.Process, "cpu_times", read_and_let_the_daemon_end)
+    assert processor_time_s(os.getpid()) >= BUSY_S - TICKS_S
 
 
 def test_the_end_of_a_session_ends_such_daemons(start: Start, tmp_path: Path) -> None:
