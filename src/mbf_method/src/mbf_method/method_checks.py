@@ -67,26 +67,19 @@ def check_grasp_method(call: Call, requests: Sequence[GraspRequest]) -> Findings
         call: Function that calls the method.
         requests: Inputs.
     """
-    faults: list[str] = []
-    notes: list[str] = []
-    found = 0
-    for number, request in enumerate(requests, start=1):
-        name = f"input {number} (object '{request.target.name}')"
-        try:
-            grasps = checked_grasps(_repeated(call, request, name, faults, notes), request, MAX_ITEMS)
-        except MethodError as error:
-            faults.append(f"{name}: {error}")
-            continue
+    names = [f"input {number} (object '{request.target.name}')" for number, request in enumerate(requests, start=1)]
+
+    def check(request: GraspRequest, name: str, faults: list[str], notes: list[str]) -> bool:
+        grasps = checked_grasps(_repeated(call, request, name, faults, notes), request, MAX_ITEMS)
         if not len(grasps.scores):
             notes.append(f"{name}: no grasp.")
-            continue
-        found += 1
+            return False
         low = _fraction_below_support(grasps, request)
         notes.append(f"{name}: {len(grasps.scores)} grasps, {low:.0%} of them unreachable below the support.")
         faults += [f"{name}: {text}" for text in _grasp_faults(grasps, request)]
-    if not faults and not found:
-        faults.append("the method found no grasp for any input.")
-    return Findings(tuple(faults), tuple(notes))
+        return True
+
+    return _check_inputs(dict(zip(names, requests)), check, "the method found no grasp for any input.")
 
 
 def check_planner(call: Call, requests: Sequence[PathRequest]) -> Findings:
@@ -96,26 +89,17 @@ def check_planner(call: Call, requests: Sequence[PathRequest]) -> Findings:
         call: Function that calls the planner.
         requests: Inputs.
     """
-    faults: list[str] = []
-    notes: list[str] = []
-    solved = 0
-    for number, request in enumerate(requests, start=1):
-        name = f"input {number}"
+
+    def check(request: PathRequest, name: str, faults: list[str], notes: list[str]) -> bool:
+        message = _repeated(call, request, name, faults, notes, allowed_time_s=request.allowed_time_s)
         try:
-            message = _repeated(call, request, name, faults, notes, allowed_time_s=request.allowed_time_s)
-            try:
-                path = checked_path(message, request, MAX_ITEMS)
-            except InvalidOutputError as error:
-                faults.append(f"{name}: {error}{_path_hint(message.get('positions'), request)}.")
-                continue
-        except MethodError as error:
-            faults.append(f"{name}: {error}")
-            continue
-        solved += bool(len(path))
+            path = checked_path(message, request, MAX_ITEMS)
+        except InvalidOutputError as error:
+            raise InvalidOutputError(f"{error}{_path_hint(message.get('positions'), request)}") from error
         notes.append(f"{name}: path of {len(path)} points." if len(path) else f"{name}: no path.")
-    if not solved and not faults:
-        faults.append("the planner found no path for any input.")
-    return Findings(tuple(faults), tuple(notes))
+        return bool(len(path))
+
+    return _check_inputs(_numbered(requests), check, "the planner found no path for any input.")
 
 
 def check_policy(call: Call, inputs: Sequence[Observation]) -> Findings:
@@ -125,23 +109,43 @@ def check_policy(call: Call, inputs: Sequence[Observation]) -> Findings:
         call: Function that calls the policy.
         inputs: Observations.
     """
-    faults: list[str] = []
-    notes: list[str] = []
-    acted = 0
-    for number, observation in enumerate(inputs, start=1):
-        name = f"input {number}"
-        try:
-            actions = checked_actions(_repeated(call, observation, name, faults, notes), observation.actions)
-        except MethodError as error:
-            faults.append(f"{name}: {error}.")
-            continue
-        acted += bool(len(actions))
+
+    def check(observation: Observation, name: str, faults: list[str], notes: list[str]) -> bool:
+        actions = checked_actions(_repeated(call, observation, name, faults, notes), observation.actions)
         notes.append(f"{name}: {len(actions)} actions." if len(actions) else f"{name}: the task is done.")
         targets = limited_targets(actions, observation.actions, _start(observation))
         if targets.fault:
             faults.append(f"{name}: {targets.fault}{_action_hint(actions, observation)}.")
-    if not acted and not faults:
-        faults.append("the policy returned no action for any input.")
+        return bool(len(actions))
+
+    return _check_inputs(_numbered(inputs), check, "the policy returned no action for any input.")
+
+
+def _numbered(inputs: Sequence[Any]) -> dict[str, Any]:
+    return {f"input {number}": item for number, item in enumerate(inputs, start=1)}
+
+
+def _check_inputs(
+    inputs: Mapping[str, Any], check: Callable[[Any, str, list[str], list[str]], bool], nothing_found: str
+) -> Findings:
+    """Checks the results for all inputs.
+
+    Args:
+        inputs: Inputs by name.
+        check: Function of input, name, faults and notes, which adds to the lists and returns whether the method found
+            something. Raises MethodError for an invalid result.
+        nothing_found: Fault if the method found nothing for any input.
+    """
+    faults: list[str] = []
+    notes: list[str] = []
+    found = False
+    for name, item in inputs.items():
+        try:
+            found = check(item, name, faults, notes) or found
+        except MethodError as error:
+            faults.append(f"{name}: {error}.")
+    if not found and not faults:
+        faults.append(nothing_found)
     return Findings(tuple(faults), tuple(notes))
 
 
