@@ -14,6 +14,7 @@ from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_core.grasping.ros_manipulator_drivers import action_of, controller_with
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_for_action
 
@@ -35,9 +36,8 @@ def trajectory_action(controllers: Iterable[Mapping[str, Any]], joints: Sequence
         PolicyMotionError: No trajectory controller has all joints.
     """
     entries = [entry for entry in controllers if entry.get("type") == "FollowJointTrajectory"]
-    for entry in entries:
-        if set(joints) <= set(entry.get("joints", ())):
-            return "/".join(filter(None, (str(entry.get("name", "")), str(entry.get("action_ns", "")))))
+    if (entry := controller_with(entries, joints)) is not None:
+        return action_of(entry)
     known = {str(entry.get("name")): list(entry.get("joints", ())) for entry in entries}
     raise PolicyMotionError(
         f"no trajectory controller has all joints {list(joints)}; controller_list has {known}; correct "

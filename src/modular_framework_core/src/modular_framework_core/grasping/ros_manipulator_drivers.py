@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -23,6 +22,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from modular_framework_core.commander.robot_groups import Group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.grasping.grasp_server import GraspCommandError, Outcome, refuse_no_effort
+from modular_framework_planning.trajectory_processing.rest_to_rest import shortest_cubic_s
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_for_action, wait_for_result
 
@@ -146,12 +146,11 @@ class TrajectoryDriver:
         return Outcome(monitor.positions(motion.targets), stalled and rests, text)
 
     def _time_s(self, motion: Motion, monitor: JointMonitor) -> float:
-        """Returns the duration of a motion; the peaks of a cubic are 1.5 d/T (velocity) and 6 d/T^2 (acceleration)."""
-        starts, times_s = monitor.positions(motion.targets), [self._duration_s]
-        for name, target in motion.targets.items():
-            limits, distance = self._group.joint(name), abs(target - starts.get(name, target))
-            times_s += [1.5 * distance / limits.velocity, math.sqrt(6.0 * distance / limits.acceleration)]
-        return max(times_s)
+        """Returns the duration of a motion from the current positions [s]."""
+        starts, joints = monitor.positions(motion.targets), [self._group.joint(name) for name in motion.targets]
+        distances = [abs(target - starts.get(name, target)) for name, target in motion.targets.items()]
+        limits = [joint.velocity for joint in joints], [joint.acceleration for joint in joints]
+        return max(self._duration_s, shortest_cubic_s(distances, *limits))
 
 
 def make_driver(
@@ -168,23 +167,36 @@ def make_driver(
     Raises:
         GraspCommandError: No controller has all joints, or the controller type is unknown.
     """
-    joints_of_controller = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
-    for entry in controllers:
-        if set(joints) <= set(entry.get("joints", [])):
-            action = "/".join(part for part in (str(entry.get("name", "")), str(entry.get("action_ns", ""))) if part)
-            match entry.get("type"):
-                case "GripperCommand":
-                    return GripperDriver(action)
-                case "FollowJointTrajectory":
-                    return TrajectoryDriver(action, group, duration_s)
-                case other:
-                    raise GraspCommandError(
-                        f"controller '{entry.get('name')}' has the type '{other}'; allowed: "
-                        "GripperCommand, FollowJointTrajectory"
-                    )
-    raise GraspCommandError(
-        f"no controller has all joints {sorted(joints)}; controller_list has {joints_of_controller}"
-    )
+    entry = controller_with(controllers, joints)
+    if entry is None:
+        known = {str(entry.get("name")): list(entry.get("joints", [])) for entry in controllers}
+        raise GraspCommandError(f"no controller has all joints {sorted(joints)}; controller_list has {known}")
+    match entry.get("type"):
+        case "GripperCommand":
+            return GripperDriver(action_of(entry))
+        case "FollowJointTrajectory":
+            return TrajectoryDriver(action_of(entry), group, duration_s)
+        case other:
+            raise GraspCommandError(
+                f"controller '{entry.get('name')}' has the type '{other}'; allowed: "
+                "GripperCommand, FollowJointTrajectory"
+            )
+
+
+def controller_with(controllers: Iterable[Mapping[str, Any]], joints: Iterable[str]) -> Mapping[str, Any] | None:
+    """Returns the first controller that has all joints; None if there is none.
+
+    Args:
+        controllers: Entries of ``controller_list``: name, action_ns, type, joints.
+        joints: Joints to move.
+    """
+    wanted = set(joints)
+    return next((entry for entry in controllers if wanted <= set(entry.get("joints", ()))), None)
+
+
+def action_of(entry: Mapping[str, Any]) -> str:
+    """Returns the action name of an entry of ``controller_list``."""
+    return "/".join(filter(None, (str(entry.get("name", "")), str(entry.get("action_ns", "")))))
 
 
 class Manipulator(Protocol):

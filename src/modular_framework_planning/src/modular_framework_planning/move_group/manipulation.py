@@ -26,6 +26,7 @@ from modular_framework_planning.planning_interface.planning_request import Plann
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
 from modular_framework_planning.robot_model.end_effectors import choose_end_effector, hand_links
 from modular_framework_planning.robot_model.robot_model import JointGroup
+from modular_framework_planning.trajectory_processing.rest_to_rest import shortest_cubic_s
 
 DEFAULT_PLANNING_TIME_S = 5.0
 FINGER_SETTLE_S = 0.5
@@ -233,8 +234,6 @@ class Manipulation:
     def _finger_points(self, fingers: Mapping[str, float], positions: Any) -> list[JointTrajectoryPoint]:
         """Returns a motion of the fingers from rest to rest, which controllers interpolate by a cubic polynomial.
 
-        The duration keeps its highest velocity, 1.5 d/T, and acceleration, 6 d/T^2, within the limits.
-
         Args:
             fingers: Final positions by joint name [rad or m].
             positions: Positions of all joints at the start, in the model's order [rad or m].
@@ -242,17 +241,14 @@ class Manipulation:
         model = self._context.model
         indices = [model.index[name] for name in fingers]
         start, end = positions[indices], np.array(list(fingers.values()))
-        distances, accelerations = np.abs(end - start), model.max_acceleration[indices]
-        durations_s = np.maximum(
-            1.5 * distances / model.max_velocity[indices], np.sqrt(6.0 * distances / accelerations)
-        )
+        shortest_s = shortest_cubic_s(np.abs(end - start), model.max_velocity[indices], model.max_acceleration[indices])
         return [
             JointTrajectoryPoint(
                 positions=row.tolist(),
                 velocities=[0.0] * len(indices),
                 time_from_start=genpy.Duration.from_sec(time_s),
             )
-            for time_s, row in ((0.0, start), (float(durations_s.max()) + FINGER_SETTLE_S, end))
+            for time_s, row in ((0.0, start), (shortest_s + FINGER_SETTLE_S, end))
         ]
 
     def _execute(self, stage: Stage, message: RobotTrajectory, change: SceneChange) -> None:
