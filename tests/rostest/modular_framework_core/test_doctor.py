@@ -110,13 +110,12 @@ def test_the_fault_of_a_device_is_named() -> None:
         publisher.unregister()
 
 
-def test_every_fault_has_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_NAMESPACE", "")
-    rospy.set_param("/robot_description_backup", rospy.get_param("/robot_description"))
+def test_every_fault_has_a_remedy() -> None:
+    description = rospy.get_param("/robot_description")
     rospy.set_param("/robot_description", "<robot")
     try:
         found: list[Finding] = [item for item in running_findings() if item.level is Level.FAULT]
     finally:
-        rospy.set_param("/robot_description", rospy.get_param("/robot_description_backup"))
+        rospy.set_param("/robot_description", description)
     assert [item.text for item in found] == ["The parameter robot_description has no valid robot description."]
     assert all(item.remedy and item.anchor for item in found)

@@ -17,6 +17,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from modular_framework_core.diagnosis.findings import Finding, fault, note, ok
+from modular_framework_planning.trajectory_execution.controllers import ACTION_KINDS, FAKE_KINDS, parse_controllers
 from modular_framework_ros.calls import CallError, is_advertised, request_service, wait_until
 from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.connections.ros_node_calls import NodeCallError, node_address, process_id
@@ -145,11 +146,8 @@ def _joint_states() -> Iterator[Finding]:
 
 def _controllers(topics: Container[str]) -> Iterator[Finding]:
     listed: Any = next(filter(None, (rospy.get_param(name, None) for name in CONTROLLER_LISTS)), [])
-    entries = [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
-    actions = [
-        "/" + "/".join(part for part in (str(entry.get(key) or "").strip("/") for key in ("name", "action_ns")) if part)
-        for entry in entries
-    ]
+    controllers, _ = parse_controllers(listed, (*ACTION_KINDS, *FAKE_KINDS), FAKE_KINDS[0])  # move_group logs faults
+    actions = [rospy.resolve_name(item.action) for item in controllers if item.kind in ACTION_KINDS]
     missing = [action for action in actions if f"{action}/status" not in topics]
     for action in missing:
         yield fault(
