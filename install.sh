@@ -257,15 +257,19 @@ build_fingerprint() {
   } | sha256sum | cut -d' ' -f1
 }
 
+# Prints the path of the file with the fingerprint of the last build.
+build_stamp() {
+  local folder=build
+  [ "${INSTALL_SPACE:-0}" = 0 ] || folder=build_install
+  printf '%s\n' "$ROOT/$folder/.fingerprint"
+}
+
 build_workspace() {
   local fingerprint stamp install=--no-install
   leave_out_packages_of_underlay
   fingerprint=$(build_fingerprint)
-  stamp="$ROOT/build/.fingerprint"
-  if [ "${INSTALL_SPACE:-0}" = 1 ]; then
-    install=--install
-    stamp="$ROOT/build_install/.fingerprint"
-  fi
+  stamp=$(build_stamp)
+  [ "${INSTALL_SPACE:-0}" = 0 ] || install=--install
   if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$fingerprint" ]; then
     say "[3/3] Workspace: up to date"
     return
@@ -281,8 +285,8 @@ examine_build() {
   missing=$(missing_debian_packages | tr '\n' ' ')
   [ -z "$missing" ] || fail "Debian packages are missing: $missing" "./install.sh"
   [ -x "$VENV/bin/python3" ] || fail "the Python environment is missing" "./install.sh"
-  [ -f "$ROOT/build/.fingerprint" ] || [ -f "$ROOT/build_install/.fingerprint" ] || fail "the workspace is not built" "./install.sh"
-  if [ "${INSTALL_SPACE:-0}" = 0 ] && [ "$(cat "$ROOT/build/.fingerprint")" != "$(build_fingerprint)" ]; then
+  [ -f "$(build_stamp)" ] || fail "the workspace is not built" "./install.sh"
+  if [ "$(cat "$(build_stamp)")" != "$(build_fingerprint)" ]; then
     say "The build is older than the files that it was made from. What to do: ./install.sh"
   fi
 }
