@@ -14,6 +14,7 @@ from modular_framework_benchmark.records.results import FAILURE_CLASS, Experimen
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_source import open_experiment
 from modular_framework_benchmark.results.errors import ResultsError
+from modular_framework_benchmark.statistics.observations import other_factors
 from modular_framework_ui.recorded_task import ReplayError
 
 _PROGRESS, _TASK_TIME = "progress", "task_time"
@@ -127,7 +128,7 @@ def run_of(results: ExperimentResults, database_folder: Path) -> RecordedRun:
         database_folder: Base of the folders of the episodes.
     """
     description = results.description
-    others = [factor.name for factor in description.factors if factor.name != description.compared]
+    others = [factor.name for factor in other_factors(results)]
     rows: list[dict[Any, Any]] = results.episodes.to_dict("records")
     methods_of_scenes: dict[tuple[str, ...], dict[int, str]] = {}
     for row in rows:

@@ -25,6 +25,7 @@ from modular_framework_benchmark.reports.figure_style import (
     unique_labels,
 )
 from modular_framework_benchmark.reports.number_text import count_phrase
+from modular_framework_benchmark.statistics.observations import other_factors
 
 MAX_GROUPS = 40
 MAX_EPISODES = 10
@@ -223,12 +224,10 @@ class _EpisodeReader:
         )
 
     def episode(self, row: Mapping[object, object]) -> FailedEpisode:
-        description = self.results.description
-        other_factors = [factor.name for factor in description.factors if factor.name != description.compared]
         return FailedEpisode(
             number=int(str(row["number"])),
-            method=str(row[description.compared]),
-            levels=", ".join(f"{name} {row[name]}" for name in other_factors),
+            method=str(row[self.results.description.compared]),
+            levels=", ".join(f"{factor.name} {row[factor.name]}" for factor in other_factors(self.results)),
             seed=int(str(row["seed"])),
             status=EpisodeStatus(str(row["status"])),
             cause=str(row["cause"]),
