@@ -2,12 +2,12 @@
 // Shows the state of a task from the changes that the server sends; page_protocol.py defines the messages.
 
 import { isSide, onPairMessage, tellPair } from "./pair_link.js";
+import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 
 const RETRY_MS = 1000;
 const AXIS_STEPS_S = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
 const PLOT_PERIOD_MS = 200;
-const PLAY_PERIOD_MS = 100;
 const MAX_ITEMS = 300; // per list
 const ROUNDING_S = 1e-4;
 const MARGIN_S = 0.5; // log lines within this time of a selected run belong to the run
@@ -404,7 +404,7 @@ element("time").addEventListener("mouseleave", () => {
 new ResizeObserver(() => plots.build()).observe(element("plots"));
 
 // ---- shown time ----------------------------------------------------------------------------------------------------
-let player = null;
+const player = new Player(element("play"), end_s, view);
 
 /** Shows the task at a time [s since its start]; null shows the latest state. */
 function view(view_s) {
@@ -440,29 +440,17 @@ function showMoment(total_s) {
   element("latest").disabled = state.view_s === null;
 }
 
-function stopPlaying() {
-  clearInterval(player);
-  player = null;
-  element("play").textContent = "Play";
-}
-
 /** Advances the shown time with the clock, from the start if the latest state is shown. */
 function togglePlaying() {
-  if (player !== null) { stopPlaying(); return; }
+  if (player.isPlaying) { player.stop(); return; }
   if (state.task === null || state.task.phase === "waiting") return;
   select(null);
-  const start_s = (state.view_s ?? 0) - performance.now() / 1000;
-  element("play").textContent = "Pause";
-  player = setInterval(() => {
-    const next_s = start_s + performance.now() / 1000;
-    if (next_s >= end_s()) stopPlaying();
-    view(Math.min(next_s, end_s()));
-  }, PLAY_PERIOD_MS);
+  player.start(state.view_s ?? 0);
 }
 
 /** Shows the first failure of a state after the shown time, or the first failure of the task. */
 function showNextFailure() {
-  stopPlaying();
+  player.stop();
   const failed = [...state.runs.values()].filter((run) => run.has_failed && !run.is_machine).sort((first, second) => first.end_s - second.end_s);
   const next = failed.find((run) => state.view_s !== null && run.end_s > viewed_s()) ?? failed[0];
   if (next === undefined) return;
@@ -471,7 +459,7 @@ function showNextFailure() {
 }
 
 element("moment").addEventListener("input", () => {
-  stopPlaying();
+  player.stop();
   if (state.task === null || state.task.phase === "waiting") return;
   const chosen_s = Number(element("moment").value); // before the selection is redrawn, which sets the slider
   select(null);
@@ -479,7 +467,7 @@ element("moment").addEventListener("input", () => {
 });
 element("play").addEventListener("click", togglePlaying);
 element("failure").addEventListener("click", showNextFailure);
-element("latest").addEventListener("click", () => { stopPlaying(); view(null); });
+element("latest").addEventListener("click", () => { player.stop(); view(null); });
 
 onPairMessage(({ data, source }) => {
   if (source !== window.parent || !isSide || state.task === null) return;

@@ -2,12 +2,11 @@
 // Shows two episodes side by side: their differences, and their pages as frames with one time and one cursor.
 
 import { onPairMessage } from "./pair_link.js";
+import { Player } from "./player.js";
 
-const PLAY_PERIOD_MS = 100;
 const element = (id) => document.getElementById(id);
 const frames = [];
 const ends_s = [0, 0]; // ends of the tasks, in simulated time since their starts
-let player = null;
 
 function make(kind, className, text) {
   const made = document.createElement(kind);
@@ -69,22 +68,12 @@ function view(view_s, source = null) {
   tellSides({ view_s }, source);
 }
 
-function stopPlaying() {
-  clearInterval(player);
-  player = null;
-  element("play").textContent = "Play";
-}
+const player = new Player(element("play"), total_s, view);
 
 function togglePlaying() {
-  if (player !== null) { stopPlaying(); return; }
+  if (player.isPlaying) { player.stop(); return; }
   const shown_s = Number(element("moment").value);
-  const start_s = (shown_s < total_s() ? shown_s : 0) - performance.now() / 1000;
-  element("play").textContent = "Pause";
-  player = setInterval(() => {
-    const next_s = start_s + performance.now() / 1000;
-    if (next_s >= total_s()) stopPlaying();
-    view(Math.min(next_s, total_s()));
-  }, PLAY_PERIOD_MS);
+  player.start(shown_s < total_s() ? shown_s : 0);
 }
 
 onPairMessage(({ data, source }) => {
@@ -96,11 +85,11 @@ onPairMessage(({ data, source }) => {
     tellSides({ total_s: total_s() });
     view(null);
   }
-  if (data.view_s !== undefined) { stopPlaying(); view(data.view_s, source); }
+  if (data.view_s !== undefined) { player.stop(); view(data.view_s, source); }
   if (data.cursor_s !== undefined) tellSides({ cursor_s: data.cursor_s }, source);
 });
-element("moment").addEventListener("input", () => { stopPlaying(); view(Number(element("moment").value)); });
+element("moment").addEventListener("input", () => { player.stop(); view(Number(element("moment").value)); });
 element("play").addEventListener("click", togglePlaying);
-element("latest").addEventListener("click", () => { stopPlaying(); view(null); });
+element("latest").addEventListener("click", () => { player.stop(); view(null); });
 
 load();

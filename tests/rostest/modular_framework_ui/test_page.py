@@ -282,6 +282,10 @@ def test_a_record_is_replayed_and_scrubbed_in_a_browser(replay_address: str) -> 
         browser.evaluate(f"{slider}.value = 0.5; {slider}.dispatchEvent(new Event('input'))")
         browser.shows("#sentence", "At 0.5 s: Running: A.")
         assert (browser.text("#graph .node.active text"), browser.text("#graph .node.failed text")) == ("A", "")
+        browser.evaluate("document.querySelector('#play').click()")
+        browser.shows("#play", "Pause")
+        browser.shows("#play", "Play")  # at the end of the task
+        browser.shows("#sentence", "The task failed")
         browser.evaluate("document.querySelector('#failure').click()")
         browser.shows("#sentence", "The task failed")
         browser.shows("#selected", f"B: fail, 1.0 s to 3.0 s. {FAILURE}")

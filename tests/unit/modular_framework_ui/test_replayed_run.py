@@ -217,3 +217,7 @@ def test_a_pair_opens_from_the_table_and_shares_one_time_and_cursor(server: Page
         until(
             lambda: browser.evaluate(f"{IN_SIDE.format(1)}.querySelector('#time.with-cursor') !== null"), "one cursor"
         )
+        browser.evaluate("document.querySelector('#play').click()")
+        browser.shows("#play", "Pause")
+        browser.shows("#play", "Play")  # at the later end of the two tasks
+        until(lambda: "succeeded" in side_text(browser, 1, "#phase"), "the end of both tasks")

@@ -35,6 +35,7 @@ FILES = {
     "/page.js": ("page.js", _SCRIPT),
     "/plots.js": ("plots.js", _SCRIPT),
     "/pair_link.js": ("pair_link.js", _SCRIPT),
+    "/player.js": ("player.js", _SCRIPT),
     "/episodes.js": ("episodes.js", _SCRIPT),
     "/pair.js": ("pair.js", _SCRIPT),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
