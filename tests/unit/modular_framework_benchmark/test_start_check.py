@@ -79,6 +79,24 @@ def test_every_misspelt_name_is_refused_with_the_nearest_one(folder: Path) -> No
         assert words in sentences
 
 
+def test_every_misspelt_name_in_the_file_of_a_vendors_driver_is_refused_with_the_nearest_one(folder: Path) -> None:
+    (folder / "vendor.yaml").write_text(
+        "move_group: {controller_list: [{name: /a, type: GripperComand, joints: [elbw_joint], action_n: b}]}\n"
+        "vendor_driver: {joint_state: [/b], silence_timeout: 0}\n"
+    )
+    arguments = ("simulation:=false", f"config_directory:={folder}", "vendor_driver_file:=vendor.yaml")
+    ended = end_of_roslaunch(*START, *arguments, "task_constructor_script:=pick_and_hold.yaml")
+    for words in (
+        "entry 0 has no key 'action_n'; allowed: name, action_ns",
+        "type is 'GripperComand'; allowed: FollowJointTrajectory, GripperCommand; did you mean 'GripperCommand'?",
+        "the robot has no joint 'elbw_joint'; allowed: ",
+        "did you mean 'elbow_joint'?",
+        "does not read the parameter '/vendor_driver/joint_state'; did you mean '/vendor_driver/joint_states'?",
+        "parameter '/vendor_driver/silence_timeout' is 0; allowed: a number, above 0",
+    ):
+        assert words in ended.stderr, ended.stderr
+
+
 def test_parameters_and_nodes_of_ones_own_are_taken(folder: Path, tmp_path: Path) -> None:
     with (folder / "generative_methods_config.yaml").open("a") as file:
         file.write("my_method: {yaw_stp: 0.2}\nmy_other_method: {gain: 1.0}\n")

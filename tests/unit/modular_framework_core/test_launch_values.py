@@ -35,6 +35,8 @@ def start() -> str:
         (["moveit_config_package:=ur5_ezgripper_robot"], "has no .*/launch/move_group.launch"),
         (["simulation:=false", "scene_file:=ur5.scene"], "'ur5.scene', .* no such file; allowed: bin.scene"),
         (["simulation:=false", "connection_file:=no.yaml"], "'no.yaml', .*allowed: .*connection_emulators.yaml"),
+        (["simulation:=false", "vendor_driver_file:=no.yaml"], "'no.yaml', .* no such file; allowed: connection_em"),
+        (["vendor_driver_file:=no.yaml"], "'no.yaml' with simulation:=true; only a real robot has a driver; set "),
         (["real_time_factor:=fast"], "is 'fast'; allowed: a number, at least 0"),
         (["seed:=abc"], "is 'abc'; allowed: a whole number"),
         (["generated_state_machine_name:=a/b"], "is 'a/b', which must be letters, digits and underscores"),

@@ -21,8 +21,10 @@ from modular_framework_core.launching.robot_controllers_spawner import (
 )
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview
+from modular_framework_core.launching.vendor_driver import controller_list_faults
 from modular_framework_ros.allowed_names import listing, nearest
 
+VENDOR_DRIVER, CONTROLLER_LIST = "vendor_driver", "/move_group/controller_list"
 SPAWNER, CONTROLLER_FILE, ARGUMENTS = "robot_controllers_spawner", "controller_file", "arguments"
 JOINT_KEYS = (
     "joint", "joints", "left_wheel", "right_wheel", "front_wheel", "rear_wheel", "front_steer", "front_steering",
@@ -50,6 +52,19 @@ def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterato
             faults = [f"{error}{'' if file in file_names else nearest(file, file_names)}"]
         for text in faults:
             yield LaunchFault(CONTROLLER_FILE, f"argument '{CONTROLLER_FILE}': {text}", ARGUMENTS)
+
+
+def vendor_controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterator[LaunchFault]:
+    """Yields unknown keys, types and joints in the list of a vendor driver's controllers.
+
+    Args:
+        launch: Launch to check.
+        joints: Movable joints of the robot; empty if unknown.
+    """
+    controllers = launch.parameters.get(CONTROLLER_LIST)
+    if isinstance(controllers, list) and any(node.executable == VENDOR_DRIVER for node in launch.nodes):
+        for text in controller_list_faults(controllers, joints):
+            yield LaunchFault(CONTROLLER_LIST, f"parameter '{CONTROLLER_LIST}' {text}")
 
 
 def _faults_in(file: ControllerFile, joints: tuple[str, ...]) -> Iterator[str]:

@@ -11,7 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.resource_lookup import UnreadableWorld
-from modular_framework_benchmark.launch_checks.ros_controller_names import controller_faults, hardware_faults
+from modular_framework_benchmark.launch_checks.ros_controller_names import (
+    controller_faults,
+    hardware_faults,
+    vendor_controller_faults,
+)
 from modular_framework_benchmark.launch_checks.ros_launch_files import (
     ARGUMENTS,
     MOVE_GROUP,
@@ -102,6 +106,7 @@ class LaunchCheck:
                 *move_group_faults(self._names, self._given),
                 *(self._planner_faults() if self._node is not None else ()),
                 *controller_faults(self.launch, self._robot.movable_joints),
+                *vendor_controller_faults(self.launch, self._robot.movable_joints),
                 *hardware_faults(self._names, self.launch, self._robot),
                 *program_faults(self.launch.nodes),
                 *sensor_faults(self.launch),

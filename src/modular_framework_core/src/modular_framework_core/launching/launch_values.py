@@ -39,6 +39,8 @@ CONFIGURATION_FILES = (
 """Required files of the configuration folder."""
 CONNECTION_FILE, OCTOMAP_FILE = "external_manipulator_connection.yaml", "sensor_plugins.yaml"
 """Files of the configuration folder that only a real robot and only an octomap require."""
+VENDOR_DRIVER_FILE = "vendor_driver_file"
+"""Argument with the configuration of a vendor's driver."""
 NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
 """Optional files of the configuration folder."""
 PORTS = {
@@ -130,12 +132,20 @@ def _package_faults(values: Mapping[str, str]) -> Iterator[str]:
             )
     simulated = values.get("simulation", "").lower() in ("true", "1")
     environment = (WORLD_FILE,) if simulated else (SCENE_FILE,) if values.get("scene_file") else ()
+    has_vendor_driver = bool(values.get(VENDOR_DRIVER_FILE))
     for name, package, folder in (*ROBOT_FILES, *environment):
-        if package in folders:
+        if package in folders and not (has_vendor_driver and name == "controller_file"):
             yield from _file_faults(name, Path(folders[package], folder), values.get(name, ""))
     configuration = Path(values.get(CONFIGURATION) or finder.get_path("modular_framework_api") + "/config")
     if not simulated and configuration.is_dir():
-        yield from _file_faults("connection_file", configuration, values.get("connection_file", ""))
+        used = VENDOR_DRIVER_FILE if has_vendor_driver else "connection_file"
+        yield from _file_faults(used, configuration, values.get(used, ""))
+    elif simulated and has_vendor_driver:
+        value = values[VENDOR_DRIVER_FILE]
+        yield (
+            f"argument '{VENDOR_DRIVER_FILE}' is '{value}' with simulation:=true; only a real robot has a driver; "
+            f"set simulation:=false, or omit {VENDOR_DRIVER_FILE}"
+        )
     moveit = Path(folders.get("moveit_config_package", ""), "launch", "move_group.launch")
     if "moveit_config_package" in folders and not moveit.is_file():
         yield f"argument 'moveit_config_package' is '{values['moveit_config_package']}', which has no {moveit}"

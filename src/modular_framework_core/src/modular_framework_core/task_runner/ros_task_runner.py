@@ -12,6 +12,7 @@ Parameters (without an argument):
     ``~config_directory``: Folder with the named messages of the task; if empty, message names are not checked.
     ``/robot_description_semantic``: SRDF with the available postures and planning groups.
     ``/run_id``: Run ID of roslaunch, which contains the launch time.
+    ``~services_to_wait_for``: Services that must be advertised before the first state; default: none.
     ``~wait_for_start``: Whether each run waits for a call of ``~start``; default: false.
     ``~record_directory``: Output folder of run records; default: ``$ROS_HOME/modular_framework/task_records``.
 Services: ``~stop`` (std_srvs/Trigger) requests a stop like SIGINT and answers at once. With ``~wait_for_start``,
@@ -30,8 +31,9 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,12 +58,12 @@ from modular_framework_core.task_runner.task_runner import (
     TaskRun,
     write_record,
 )
-from modular_framework_ros.calls import CallError
+from modular_framework_ros.calls import CallError, is_advertised
 from modular_framework_ros.connections.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.simulated_time import SimulatedTime
-from modular_framework_ros.start_up import start_timeout
+from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 STOP_GRACE_S = 0.6
 """Time for running states to stop before the node exits without them [s]."""
@@ -301,11 +303,12 @@ def main() -> int:
     _start_node("run_task")
     try:
         task = prepare(rospy.myargv()[1:])
-        wait_for_start = _parameter("~wait_for_start")
+        waits_for_start = _parameter("~wait_for_start")
+        _await_services(_parameter("~services_to_wait_for"))
     except TaskNotRun as error:
         rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
-    if wait_for_start:
+    if waits_for_start:
         return _finish(StartedRuns(task).serve())
     return _finish(run_machine(task))
 
@@ -320,6 +323,17 @@ def _parameter(name: str) -> Any:
         return DeclaredParameters("modular_framework_core", "run_task").value(name)
     except ParameterError as error:
         raise TaskNotRun(str(error)) from error
+
+
+def _await_services(names: Sequence[str]) -> None:
+    """Waits for services of other nodes.
+
+    Raises:
+        TaskNotRun: A service was not advertised in time, or ROS is shut down.
+    """
+    for name in map(rospy.resolve_name, names):
+        if not wait_for_start(partial(is_advertised, name), f"service '{name}'"):
+            raise TaskNotRun(f"service '{name}' of ~services_to_wait_for was not advertised; see the log of its node")
 
 
 class StartedRuns:
