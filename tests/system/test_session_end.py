@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The end of a test session leaves no process behind, also when roslaunch itself was killed."""
+"""A test session refuses a launch without a master, and its end leaves no process behind."""
 
 from __future__ import annotations
 
 import os
 import signal
+
+import pytest
 
 from modular_framework_testing.ros_session import RosSession, until
 
@@ -19,3 +21,8 @@ def test_a_session_whose_roslaunch_was_killed_leaves_no_master_behind(session: R
     assert session.processes(), "the master and the node outlive roslaunch"
     session.stop()
     until(lambda: not session.processes(), "all processes of the session to end", 30.0)
+
+
+def test_a_launch_without_a_master_is_refused_instead_of_waiting_forever(session: RosSession) -> None:
+    with pytest.raises(AssertionError, match="no ROS master on port .*; call start_master before launch"):
+        session.launch("<launch/>")

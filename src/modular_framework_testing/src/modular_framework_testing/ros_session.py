@@ -90,7 +90,11 @@ class RosSession(LaunchSession):
         Args:
             launch_xml: Path of a launch file, or its text.
             **args: Arguments `name:=value`.
+
+        Raises:
+            AssertionError: No master runs; roslaunch would wait for one forever.
         """
+        assert self._master_answers(), f"no ROS master on port {self.port}; call start_master before launch"
         number = len(self._launches)
         path = Path(launch_xml) if isinstance(launch_xml, Path) else self.folder / f"launch_{number}.launch"
         if isinstance(launch_xml, str):
