@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from modular_framework_core.grasp_generation import surface_points
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
     measure_gripper,
-    rotation_about,
 )
 from modular_framework_core.grasp_generation.surface_points import Surface
 from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
@@ -51,7 +51,7 @@ def cylinder(diameter: float, height: float) -> Thing:
 
 
 def block(width: float, depth: float, height: float) -> Thing:
-    turn, place = rotation_about(UP, 0.4), np.array([0.1, 0.5, height / 2])
+    turn, place = Rotation.from_euler("z", 0.4).as_matrix(), np.array([0.1, 0.5, height / 2])
     return Thing(
         surface_points.box((width, depth, height)).transformed(turn, place),
         coal.Box(width, depth, height),

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from modular_framework_core.grasp_generation import surface_points
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
     measure_gripper,
-    rotation_about,
 )
 from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.grasp_generation.planning_scene_objects import (
@@ -54,7 +54,7 @@ def gripper(urdf: str) -> GripperGeometry:
 
 
 def on_table(surface: Surface, x: float, y: float, yaw: float = 0.0) -> Surface:
-    turned = surface.transformed(rotation_about(UP, yaw), np.zeros(3))
+    turned = surface.transformed(Rotation.from_euler("z", yaw).as_matrix(), np.zeros(3))
     return turned.transformed(np.eye(3), np.array([x, y, TABLE - turned.points[:, 2].min()]))
 
 
@@ -120,7 +120,7 @@ def test_something_flat_cannot_be_grasped_from_above(gripper: GripperGeometry) -
 
 
 def test_a_lying_cylinder_is_grasped_across_its_axis_at_its_middle(gripper: GripperGeometry) -> None:
-    tipping = rotation_about(np.array([0.0, 1.0, 0.0]), math.pi / 2)
+    tipping = Rotation.from_euler("y", math.pi / 2).as_matrix()
     lying = surface_points.cylinder(0.14, 0.02).transformed(tipping, np.zeros(3))
     best = top_down_grasps(on_table(lying, 0.0, 0.5, 0.3), TABLE, gripper, SETTINGS)[0]
     assert abs(math.cos(best.yaw - 0.3)) < 0.05
@@ -212,4 +212,6 @@ def test_rotations_of_quaternions_are_rotations() -> None:
     for _ in range(20):
         matrix = rotation_matrix(vector(*(generator.uniform(-1, 1) for _ in range(4))))
         assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert rotation_matrix(vector(0, 0, math.sin(0.2), math.cos(0.2))) == pytest.approx(rotation_about(UP, 0.4))
+    assert rotation_matrix(vector(0, 0, math.sin(0.2), math.cos(0.2))) == pytest.approx(
+        Rotation.from_euler("z", 0.4).as_matrix()
+    )

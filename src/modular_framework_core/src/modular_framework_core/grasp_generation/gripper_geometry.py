@@ -9,7 +9,7 @@ strokes of the pads may differ; the middle between the pads then depends on the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -337,12 +337,10 @@ def _face_each_other(corners: Array, others: Array) -> bool:
 
 def _hand_parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
     """Places the collision shapes of the hand in the grasp frame, at every joint position."""
-    factors = model.driven_joints(joint)
-    states = [{name: factor * position for name, factor in factors.items()} for position in positions.tolist()]
+    driven = {name: factor * positions for name, factor in model.driven_joints(joint).items()}
+    to_grasp_frame = np.linalg.inv(model.pose(grasp_link, driven))
     for link in model.hand_links(joint):
-        transforms = np.array(
-            [np.linalg.inv(model.pose(grasp_link, state)) @ model.pose(link, state) for state in states]
-        )
+        transforms = np.broadcast_to(to_grasp_frame @ model.pose(link, driven), (len(positions), 4, 4))
         for body in model.bodies_of(link):
             corners = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.corners) + transforms[:, None, :3, 3]
             normals = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.planes[:, :3])
@@ -404,37 +402,41 @@ class _Model:
             except ShapeError as error:
                 raise GripperGeometryError(f"the collision shape of link '{link}' {error}") from error
 
-    def pose(self, link: str, state: dict[str, float]) -> Array:
-        """Returns the pose of a link in the root link, shape (4, 4)."""
-        transform = np.eye(4)
-        for name, _ in self._tree.up(link):
-            transform = self._origins[name] @ _motion(self.joints[name], self._position(name, state)) @ transform
-        return transform
+    def pose(self, link: str, positions: Mapping[str, Array]) -> Array:
+        """Returns the poses of a link in the root link.
 
-    def _position(self, joint: str, state: dict[str, float]) -> float:
+        Args:
+            link: Link.
+            positions: Positions of joints, shape (n,) each [rad or m]; other joints are at 0.
+
+        Returns:
+            Transforms, shape (n, 4, 4); shape (4, 4) if none of the joints moves the link.
+        """
+        transforms = np.eye(4)
+        for name, _ in self._tree.up(link):
+            transforms = self._origins[name] @ _motion(self.joints[name], self._position(name, positions)) @ transforms
+        return transforms
+
+    def _position(self, joint: str, positions: Mapping[str, Array]) -> Array:
+        zero = np.array(0.0)
         mimic = self._mimics.get(joint)
         if mimic is None:
-            return state.get(joint, 0.0)
-        return mimic.multiplier * state.get(mimic.leader, 0.0) + mimic.offset
+            return positions.get(joint, zero)
+        return mimic.multiplier * positions.get(mimic.leader, zero) + mimic.offset
 
 
-def _motion(joint: Joint, value: float) -> Array:
-    """Returns the transform of a joint position [rad or m] relative to the joint origin, shape (4, 4)."""
-    axis = _unit_axis(joint)
-    transform = np.eye(4)
+def _motion(joint: Joint, positions: Array) -> Array:
+    """Returns the transforms of joint positions of shape (...) relative to the joint origin, shape (..., 4, 4)."""
+    along = np.multiply.outer(positions, _unit_axis(joint))
+    transforms = np.zeros((*along.shape[:-1], 4, 4)) + np.eye(4)
     if joint.kind == "prismatic":
-        transform[:3, 3] = axis * value
+        transforms[..., :3, 3] = along
     elif joint.kind in ("revolute", "continuous"):
-        transform[:3, :3] = rotation_about(axis, value)
-    return transform
+        transforms[..., :3, :3] = Rotation.from_rotvec(along).as_matrix()
+    return transforms
 
 
 def _unit_axis(joint: Joint) -> Array:
     """Returns the axis of a joint in the joint frame as a unit vector, shape (3,)."""
     axis = np.array(joint.axis)
     return axis / (np.linalg.norm(axis) or 1.0)
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Returns the matrix of a rotation about an axis by an angle [rad]."""
-    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
