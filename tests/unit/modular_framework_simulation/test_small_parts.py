@@ -228,6 +228,17 @@ def test_a_mesh_that_is_not_convex_is_cut_into_convex_parts_of_its_volume(tmp_pa
     assert trimesh.load(parts.hull(Mesh(file)), force="mesh").volume > 1.3 * ring.volume
 
 
+def test_a_fine_mesh_is_simplified_before_it_is_cut_into_convex_parts_of_its_volume(tmp_path: Path) -> None:
+    block, groove = trimesh.creation.box((0.1, 0.06, 0.05)), trimesh.creation.box((0.08, 0.1, 0.05))
+    channel = block.difference(groove.apply_translation((0.0, 0.0, 0.01)))
+    file = tmp_path / "channel.stl"
+    channel.subdivide(iterations=5).export(file)
+    said: list[str] = []
+    files = ConvexParts(tmp_path / "cache", said.append).parts(Mesh(file))
+    assert f"channel.stl with 28,672 triangles, simplified to {len(channel.faces)}, into convex parts" in said[0]
+    assert volume_of(files) == pytest.approx(channel.volume, rel=0.01)
+
+
 def test_convex_parts_of_an_open_mesh_are_no_larger_than_it(tmp_path: Path) -> None:
     ring = trimesh.creation.annulus(r_min=0.3, r_max=0.5, height=0.2, sections=8)
     ring.update_faces(np.arange(len(ring.faces)) > 1)

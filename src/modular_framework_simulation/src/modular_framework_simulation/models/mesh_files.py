@@ -21,9 +21,14 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.sdf_specs import Mesh
 from modular_framework_urdf.mesh_reader import MeshError, TriangleMesh, read_mesh
 
-_CACHE_VERSION = "3"
+_CACHE_VERSION = "4"
 _CONCAVITY_THRESHOLD = 0.03
 """CoACD's limit of the concavity of a part, relative to the size of the mesh."""
+
+_FINE_TRIANGLES = 5000
+"""Number of triangles above which a closed mesh is simplified before its decomposition."""
+_SIMPLIFICATION_TOLERANCE = 0.003
+"""Maximum deviation of a simplified mesh, as a fraction of the longest side: a tenth of the limit of the concavity."""
 
 _MIN_CONVEX_VOLUME_RATIO = 0.985
 """Minimum ratio of a mesh's volume to its convex hull's volume for a mesh that is treated as convex."""
@@ -117,17 +122,18 @@ class ConvexParts:
         volume_ratio = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
         if kind == "hull" or volume_ratio > _MIN_CONVEX_VOLUME_RATIO:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
-        self._log(
-            f"decomposing {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take "
-            f"minutes; the parts are cached in {self._cache_folder}"
-        )
         if not solid.is_volume:  # CoACD would decompose an open mesh as a shell, into many more parts
             repair: Any = trimesh.repair
             repair.fill_holes(solid)
             repair.fix_normals(solid)
-        if not solid.is_volume:
-            return _clipped_to(_decompose(loaded), hull)
-        return _decompose(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)))
+        is_closed = solid.is_volume
+        cut = _simplified(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces))) if is_closed else loaded
+        simplified = f", simplified to {len(cut.triangles):,}," if len(cut.triangles) < len(solid.faces) else ""
+        self._log(
+            f"decomposing {mesh.path} with {len(loaded.triangles):,} triangles{simplified} into convex parts, "
+            f"which may take minutes; the parts are cached in {self._cache_folder}"
+        )
+        return _decompose(cut) if is_closed else _clipped_to(_decompose(cut), hull)
 
 
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
@@ -164,6 +170,26 @@ def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:
     coacd.set_log_level("error")
     pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.triangles), threshold=_CONCAVITY_THRESHOLD, seed=1)
     return [TriangleMesh(np.asarray(vertices), np.asarray(faces)) for vertices, faces in pieces]
+
+
+def _simplified(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns a closed mesh with the same shape and fewer triangles, which CoACD decomposes in less time.
+
+    Args:
+        mesh: Closed mesh; a mesh of at most _FINE_TRIANGLES triangles is returned unchanged.
+    """
+    if len(mesh.triangles) <= _FINE_TRIANGLES:
+        return mesh
+    import manifold3d
+
+    solid = manifold3d.Manifold(
+        manifold3d.Mesh64(vert_properties=mesh.vertices, tri_verts=mesh.triangles.astype(np.uint64))
+    )
+    simple = solid.simplify(_SIMPLIFICATION_TOLERANCE * float(np.ptp(mesh.vertices, axis=0).max())).to_mesh64()
+    triangles = np.asarray(simple.tri_verts, dtype=np.int64)
+    if solid.status() != manifold3d.Error.NoError or not len(triangles):  # for example, triangles that share an edge
+        return mesh
+    return TriangleMesh(np.asarray(simple.vert_properties)[:, :3], triangles)
 
 
 def _clipped_to(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
