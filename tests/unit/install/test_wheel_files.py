@@ -14,7 +14,7 @@ from source_tree import read_source_tree  # noqa: E402
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 IMPORT_NAMES = {"pyyaml": "yaml"}
 DEPENDENCIES = [text.partition(">=") for text in PROJECT["project"]["dependencies"]]
-OTHERS = {"PIL", "coacd", "kaleido", "markupsafe", "numba", "trimesh"}
+OTHERS = {"PIL", "coacd", "kaleido", "manifold3d", "markupsafe", "numba", "trimesh"}
 """Package of the extra `figures`, package that jinja2 needs, and imports in functions that statistics and reports do not call."""
 
 
