@@ -121,7 +121,9 @@ def test_the_example_drives_the_arm_to_its_goal_and_closes_the_gripper(robot: Ro
     (report,) = robot.reports
     figures = report["figures"]
     assert (report["component"], report["succeeded"]) == ("policy", True)
-    assert figures["actions"] == 4 * (figures["queries"] - 1)  # the last query is answered by the end of the task
+    assert figures["actions"] == 4 * figures["chunks"]
+    assert figures["chunks"] == figures["queries"] - 1  # the last query is answered by the end of the task
+    assert figures["clipped_actions"] == 0.0
     assert figures["method_time_s"] > 0.0 and figures["transport_time_s"] > 0.0
 
 
@@ -161,6 +163,15 @@ def test_targets_outside_the_limits_are_clamped_on_request(robot: Robot) -> None
     state = RunPolicy(command=faulty("leaves the limits"), rate=20.0, horizon=4, clamp=True, max_duration=10.0)
     assert robot.run(state) == "success", state.reason
     assert robot.positions()["shoulder"] <= 2.0
+    assert robot.reports[0]["figures"]["clipped_actions"] > 0.0
+
+
+def test_answers_that_take_longer_than_an_action_are_counted(robot: Robot) -> None:
+    state = RunPolicy(command=faulty("is slow"), rate=5.0, horizon=4)
+    assert robot.run(state) == "success", state.reason
+    figures = robot.reports[0]["figures"]
+    assert (figures["queries"], figures["late_answers"]) == (4.0, 2.0)
+    assert figures["method_time_s"] > 0.6
 
 
 @pytest.mark.parametrize("kind", ["velocities", "deltas"])

@@ -128,6 +128,14 @@ def test_a_target_outside_the_limits_has_a_reason_and_is_clamped(
     assert re.search(fault, targets.fault)
     assert targets.values[0, 0] == pytest.approx(limited)
     assert targets.values[0, 3] <= 1.0
+    assert targets.clipped.tolist() == [True]
+
+
+def test_only_the_actions_that_exceed_a_limit_count_as_clipped() -> None:
+    actions = np.array([[0.1, 0, 0, 0], [0.6, 0, 0, 0], [0.3, 0, 0, 0.5]], float)
+    targets = limited_targets(actions, SPEC, np.zeros(4))
+    assert targets.clipped.tolist() == [False, True, False]
+    assert targets.values[:, 0] == pytest.approx([0.1, 0.3, 0.3])
 
 
 @pytest.mark.parametrize(

@@ -135,6 +135,37 @@ def test_an_object_is_held_until_it_has_moved_by_3_cm_in_the_hand(drift_m: float
     assert METRICS["slip"].measure(shaken) == pytest.approx(drift_m * (1.0 - 0.56) / 4.0, abs=1e-9)
 
 
+def policy_run(**figures: float) -> ComponentReport:
+    return ComponentReport(
+        *("policy", "run_policy", True, "", 1.0, 3.0),
+        wall_s=2.0,
+        figures={declared_figure("policy", name): value for name, value in figures.items()},
+    )
+
+
+def test_the_metrics_of_a_policy_cover_all_its_runs_and_its_times_are_means_per_query() -> None:
+    counts = {"queries": 3.0, "chunks": 2.0, "actions": 16.0, "late_answers": 1.0, "clipped_actions": 5.0}
+    times = {"method_time_s": 0.6, "queue_time_s": 0.03, "transport_time_s": 0.06}
+    again = policy_run(queries=1.0, chunks=1.0, actions=8.0, method_time_s=0.2, clipped_actions=0.0)
+    not_started = policy_run(method_fault=1.0)
+    runs = replace(episode(), reports=(policy_run(**counts, **times), again, not_started))
+    names = [name for name, entry in METRICS.items() if entry.metric.component == "policy"]
+    assert measure(names, runs).values == pytest.approx(
+        {
+            "policy_method_time": 0.2,
+            "policy_queue_time": 0.0075,
+            "policy_transport_time": 0.015,
+            "policy_late_answers": 1.0,
+            "policy_chunks": 3.0,
+            "policy_actions": 24.0,
+            "policy_clipped_actions": 5.0,
+        }
+    )
+    unanswered = replace(episode(), reports=(policy_run(queries=0.0, actions=0.0),))
+    measured = measure(["policy_method_time", "policy_actions"], unanswered)
+    assert measured.values == {"policy_method_time": None, "policy_actions": 0.0}
+
+
 def test_an_object_that_stays_on_its_support_has_no_slip_and_no_grasp_time() -> None:
     standing = ObjectTrack("can", TIMES, np.zeros((len(TIMES), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(TIMES), 1)))
     measured = measure(["lift", "slip", "grasp_time"], replace(episode(), objects={"can": standing}))

@@ -69,3 +69,10 @@ def test_a_mode_without_simulation_counts_itself_what_a_method_says_in_an_episod
     assert known["task"]["candidates"].source is Source.SAID
     assert known["grasps"]["candidates"].source is Source.MEASURED
     assert known["planning"]["planning_time"].clock is Clock.WALL
+
+
+def test_an_experiment_with_tasks_knows_the_metrics_of_policies_and_what_only_the_policy_says() -> None:
+    known = known_metrics()
+    assert known["task"]["policy_method_time"].source is Source.SAID
+    assert known["task"]["policy_late_answers"].source is Source.MEASURED
+    assert "policy_actions" not in known["planning"]

@@ -34,10 +34,12 @@ class Targets:
 
     Attributes:
         values: Target positions of the columns after each action, shape (n, a) [rad or m; fraction for the gripper].
+        clipped: Whether the wanted target of each action exceeded a limit, shape (n,).
         fault: First target that exceeded a limit, as text; "" if all targets respect the limits.
     """
 
     values: np.ndarray
+    clipped: np.ndarray
     fault: str
 
 
@@ -79,18 +81,19 @@ def limited_targets(actions: np.ndarray, spec: ActionSpec, start: np.ndarray) ->
         spec: Required actions.
         start: Target before the first action, shape (a,).
     """
-    values, fault, previous = np.zeros(actions.shape), "", start
+    values, clipped, fault, previous = np.zeros(actions.shape), np.zeros(len(actions), bool), "", start
     reach = spec.max_velocity / spec.rate_hz
     for index, action in enumerate(actions):
         wanted = _target(action, spec, previous)
         reachable = np.clip(wanted, previous - reach, previous + reach)
         values[index] = np.clip(reachable, spec.lower, spec.upper)
         excess = np.abs(wanted - values[index])
-        if not fault and excess.max() > LIMIT_TOLERANCE:
+        clipped[index] = excess.max() > LIMIT_TOLERANCE
+        if clipped[index] and not fault:
             worst = int(np.argmax(excess))
             fault = _fault_text(index, worst, spec, (previous[worst], wanted[worst]))
         previous = values[index]
-    return Targets(values, fault)
+    return Targets(values, clipped, fault)
 
 
 def _target(action: np.ndarray, spec: ActionSpec, previous: np.ndarray) -> np.ndarray:

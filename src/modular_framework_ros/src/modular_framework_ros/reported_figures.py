@@ -72,7 +72,14 @@ POLICY_METHOD_TIME, POLICY_QUEUE_TIME, POLICY_TRANSPORT_TIME, POLICY_FAULT = (
 )
 """The same figures of a policy, summed over its queries."""
 POLICY_QUERIES = Figure("queries", "policy", "", "Queries that the policy answered.", source=Source.MEASURED)
+POLICY_CHUNKS = Figure("chunks", "policy", "", "Chunks of actions that the arm executed.", source=Source.MEASURED)
 POLICY_ACTIONS = Figure("actions", "policy", "", "Actions that the arm executed.", source=Source.MEASURED)
+POLICY_LATE = Figure(
+    "late_answers", "policy", "", "Answers that took longer than the period of an action.", source=Source.MEASURED
+)
+POLICY_CLIPPED = Figure(
+    "clipped_actions", "policy", "", "Executed actions whose targets were moved to the limits.", source=Source.MEASURED
+)
 SOURCES_PARAMETER = "method_sources"
 """Private parameter with the digest of the sources of an external method, set by its node."""
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)

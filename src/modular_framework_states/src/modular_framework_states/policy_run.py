@@ -15,25 +15,19 @@ import rospy
 from mbf_method.actions import checked_actions, limited_targets
 from mbf_method.errors import InvalidOutputError
 from mbf_method.grasp_request import RobotState
-from mbf_method.method_client import CallTimes, MethodClient
+from mbf_method.method_client import MethodClient
 from mbf_method.observation import Observation
 from mbf_method.openpi import openpi_request
 from modular_framework_core.grasping.ros_grasp_server import read_controllers
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_ros.reported_figures import (
-    POLICY_ACTIONS,
-    POLICY_METHOD_TIME,
-    POLICY_QUERIES,
-    POLICY_QUEUE_TIME,
-    POLICY_TRANSPORT_TIME,
-    Figure,
-)
+from modular_framework_ros.reported_figures import Figure
 from modular_framework_ros.seeds import MAX_SEED, derived_seed, seed_parameter
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.manipulator_postures import posture_positions
 from modular_framework_states.policy_actions import action_spec
 from modular_framework_states.policy_arm import PolicyArm, PolicyMotionError, trajectory_action
 from modular_framework_states.policy_cameras import PolicyCameras
+from modular_framework_states.policy_figures import PolicyFigures
 from modular_framework_states.policy_gripper import PolicyGripper
 
 PERIOD_S = 0.005
@@ -124,14 +118,14 @@ class PolicyRun:
         self._client.start()
         self._start_s = rospy.get_time()
         try:
-            is_done = self._drive(figures)
+            is_done = self._drive(PolicyFigures(figures, self._settings.rate_hz))
             self._settle()
         finally:
             self._arm.stop()
         if not is_done and self._settings.must_finish:
             raise PolicyMotionError(f"the policy was not done within {self._settings.max_duration_s:g} s")
 
-    def _drive(self, figures: dict[Figure, float]) -> bool:
+    def _drive(self, figures: PolicyFigures) -> bool:
         """Executes chunks; returns whether the policy is done."""
         target: npt.NDArray[np.float64] | None = None
         while not self._state.stop_requested():
@@ -153,7 +147,7 @@ class PolicyRun:
             self._execute(executed)
             target = executed[-1]
             self._step += len(executed)
-            figures[POLICY_ACTIONS] = float(self._step)
+            figures.add_chunk(targets.clipped[: len(executed)])
         return False
 
     def _observation(self) -> Observation:
@@ -174,12 +168,12 @@ class PolicyRun:
             seed=_seed(self._step),
         )
 
-    def _actions(self, observation: Observation, figures: dict[Figure, float]) -> npt.NDArray[np.float64]:
-        """Returns the checked actions of the policy, and adds the durations of the query to the figures."""
+    def _actions(self, observation: Observation, figures: PolicyFigures) -> npt.NDArray[np.float64]:
+        """Returns the checked actions of the policy, and adds the query to the figures."""
         keys = self._settings.openpi_keys
         request = openpi_request(observation, keys) if keys else observation
         result = self._client.call(request, is_cancelled=self._state.stop_requested)
-        _add_times(figures, result.times)
+        figures.add_query(result.times)
         return checked_actions(result.message, self._spec)
 
     def _execute(self, targets: npt.NDArray[np.float64]) -> None:
@@ -224,14 +218,3 @@ def _seed(step: int) -> int:
     """Returns the seed of a query, derived from the parameter ``/seed``; random if the parameter is not set."""
     seed = seed_parameter()
     return secrets.randbelow(MAX_SEED + 1) if seed is None else derived_seed(seed, "run_policy", step)
-
-
-def _add_times(figures: dict[Figure, float], times: CallTimes) -> None:
-    added = {
-        POLICY_QUERIES: 1.0,
-        POLICY_METHOD_TIME: times.method_s,
-        POLICY_QUEUE_TIME: times.queue_s,
-        POLICY_TRANSPORT_TIME: times.transport_s,
-    }
-    for figure, value in added.items():
-        figures[figure] = figures.get(figure, 0.0) + value

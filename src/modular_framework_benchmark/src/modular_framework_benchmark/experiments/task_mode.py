@@ -315,6 +315,6 @@ TASK = Mode(
     TaskSettings,
     "modular_framework_benchmark.episodes.ros_task_runner:TaskEpisodeRunner",
     "modular_framework_benchmark.modes.ros_setting_checks:check_task",
-    frozenset({"task", "generation", "planning", "execution", "grasp"}),
+    frozenset({"task", "generation", "planning", "execution", "grasp", "policy"}),
     _finish,
 )

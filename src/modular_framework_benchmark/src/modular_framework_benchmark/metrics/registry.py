@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
-from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
+from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, policy, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
 from modular_framework_benchmark.records.episode_settings import MetricSpec, OwnMetric
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
@@ -130,6 +130,13 @@ _REGISTERED_METRICS = (
     _make_metric(grasp.slip, _VALUE, _LOWER, unit="m", bounds=_NONNEGATIVE),
     _make_time_metric(grasp.grasp_time, _LOWER, _SIMULATED),
     _make_time_metric(grasp.hold_time, _HIGHER, _SIMULATED),
+    _make_time_metric(policy.policy_method_time, _LOWER, _WALL, source=_REPORTED),
+    _make_time_metric(policy.policy_queue_time, _LOWER, _WALL, source=_REPORTED),
+    _make_time_metric(policy.policy_transport_time, _LOWER, _WALL),
+    _make_metric(policy.policy_late_answers, _COUNT, _LOWER),
+    _make_metric(policy.policy_chunks, _COUNT, _LOWER),
+    _make_metric(policy.policy_actions, _COUNT, _LOWER),
+    _make_metric(policy.policy_clipped_actions, _COUNT, _LOWER),
 )
 
 METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _REGISTERED_METRICS}

@@ -52,7 +52,7 @@ from modular_framework_benchmark.statistics.robustness import Robustness, analys
 
 SUCCESS = "success"
 MAX_PAIRED_METHODS = 3  # maximum number of methods with one figure per pair; more methods are ranked in one figure
-COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # order of a pick; user components follow
+COMPONENTS = ("task", "generation", "planning", "execution", "grasp", "policy")  # user components follow
 
 
 @dataclass(frozen=True, slots=True)
