@@ -124,6 +124,9 @@ def test_the_example_drives_the_arm_to_its_goal_and_closes_the_gripper(robot: Ro
     assert figures["actions"] == 4 * figures["chunks"]
     assert figures["chunks"] == figures["queries"] - 1  # the last query is answered by the end of the task
     assert figures["clipped_actions"] == 0.0
+    method = report["method"]
+    assert (method["command"], method["address"], method["said_name"]) == (EXAMPLE, "", "reach")
+    assert len(method["sources"]) == 64
     assert figures["method_time_s"] > 0.0 and figures["transport_time_s"] > 0.0
 
 

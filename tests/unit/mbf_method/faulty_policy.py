@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "src/mbf_method/src"))
 
 from mbf_method import Actions, Observation, policy, task_done  # noqa: E402
 
+__version__ = "1.2"
 FAULT = sys.argv[1]
 STEP_RAD = 0.02
 CHUNKS = 3

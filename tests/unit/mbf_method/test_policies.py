@@ -158,6 +158,12 @@ def test_each_fault_of_a_policy_has_its_class_and_cause(fault: str, error: type[
             checked_actions(client.call(LATER).message, SPEC)
 
 
+def test_a_policy_states_its_name_and_the_version_of_its_module() -> None:
+    with started("") as client:
+        client.start()
+        assert (client.said_name, client.said_version, len(client.sources)) == ("steps", "1.2", 64)
+
+
 def test_a_policy_that_does_not_start_has_its_cause() -> None:
     with started("exits") as client, pytest.raises(MethodStartError, match="exited with code 3"):
         client.start()
@@ -271,6 +277,14 @@ def test_the_traceback_of_an_openpi_server_is_a_fault_and_the_next_call_connects
             client.call(openpi_request(FIRST, OPENPI_KEYS))
         assert len(client.call(openpi_request(FIRST, OPENPI_KEYS)).message["actions"]) == SPEC.horizon
         client.close()
+
+
+def test_an_openpi_server_has_the_name_that_its_metadata_state() -> None:
+    with openpi_server(pack({"name": "pi0"}), lambda _: {"actions": GOOD}) as address:
+        client = openpi_client(address)
+        client.start()
+        client.close()
+    assert (client.said_name, client.said_version, client.sources) == ("pi0", "", "")
 
 
 @pytest.mark.parametrize("metadata", ["hello", pack({"protocol": "mbf_method", "version": 1, "kind": "actions"})])

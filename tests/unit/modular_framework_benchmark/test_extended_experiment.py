@@ -39,6 +39,8 @@ MODEL = """<sdf version='1.6'><model name='m'><link name='l'><visual name='v'><g
   <mesh><uri>model://table/meshes/top.stl</uri></mesh></geometry></visual></link></model></sdf>"""
 PACKAGE = "<package><name>my_robot</name><version>1.0.0</version><description>.</description></package>"
 
+TASK_ARGUMENT = '<arg name="task_constructor_script" default=""/>'
+
 
 class Stack:
     """A launch file whose files are in a folder.
@@ -80,6 +82,14 @@ class Stack:
             metrics=(OwnMetric("own", f"{self.metrics}:own"),),
         )
         return replace(settings, **changes)  # type: ignore[arg-type]
+
+    def spec_of_task(self, task: Path) -> EpisodeSpec:
+        """Returns an episode of a task; the launch then has the argument of the task."""
+        if TASK_ARGUMENT not in self.launch.read_text():
+            self.launch.write_text(
+                self.launch.read_text().replace("<rosparam command", f"{TASK_ARGUMENT}<rosparam command")
+            )
+        return EpisodeSpec(0, {}, 0, 1, self.settings(task=str(task)))
 
     def digests(self, *specs: EpisodeSpec) -> dict[str, str]:
         loaded_stack.cache_clear()  # as in another process
@@ -191,7 +201,7 @@ def test_packages_of_nodes_and_versions_of_libraries_count(stack: Stack) -> None
     assert {"package top_down_grasps", "package modular_framework_planning", "Python package numpy"} <= set(digests)
 
 
-@pytest.mark.parametrize("mode", ["task", "grasps"])
+@pytest.mark.parametrize("mode", ["task", "grasps", "policy"])
 def test_the_python_files_beside_the_script_of_an_external_method_count(
     stack: Stack, tmp_path: Path, mode: str
 ) -> None:
@@ -205,6 +215,10 @@ def test_the_python_files_beside_the_script_of_an_external_method_count(
         settings = GraspSettings(method="a.b:C", method_parameters={"command": command})
         if mode == "grasps":
             return run_digests([EpisodeSpec(0, {}, 0, 1, settings)])["folder of my_grasps/method.py"]
+        if mode == "policy":
+            task = tmp_path / "task.yaml"
+            task.write_text(f"params: {{own: {command}}}\nstates: [{{A: {{source: run_policy, command: params.own}}}}]")
+            return stack.digests(stack.spec_of_task(task))["folder of my_grasps/method.py"]
         stack.launch.write_text(stack.launch.read_text().replace("<param", f"<rosparam>method: {{command: {command}}}"
                                 "</rosparam><param", 1))  # fmt: skip
         return stack.digests()["folder of my_grasps/method.py"]

@@ -7,6 +7,7 @@ import pytest
 from moveit_msgs.msg import ExecuteTrajectoryActionGoal, ExecuteTrajectoryActionResult
 
 from modular_framework_benchmark.episodes.ros_samples import SUCCEEDED, Samples
+from modular_framework_ros.component_report import ReportedMethod
 
 
 def goal(number: str, stamp_s: int) -> ExecuteTrajectoryActionGoal:
@@ -48,3 +49,11 @@ def test_a_goal_without_a_result_has_not_ended(samples: Samples) -> None:
     assert not samples.actions_ended()
     samples.clear()
     assert samples.actions_ended()
+
+
+def test_the_methods_that_components_report_are_found_whatever_else_they_report(samples: Samples) -> None:
+    method = {"command": ["python3", "policy.py"], "address": "", "sources": "aa", "said_name": "reach", "other": 1}
+    samples.components += [(0.0, {"component": "policy", "method": method}), (1.0, {"component": "my_camera"})]
+    assert samples.process_methods() == [
+        ReportedMethod(command=("python3", "policy.py"), sources="aa", said_name="reach")
+    ]

@@ -27,6 +27,7 @@ from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStat
 from modular_framework_benchmark.records.snapshot_parts import SNAPSHOT_PARTS
 from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_planning.plan_statistics import PlannerRun
+from modular_framework_ros.component_report import ReportedMethod
 
 REPLACED = "the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned"
 
@@ -92,6 +93,30 @@ def test_a_record_says_the_sources_of_an_external_method_and_which_are_unknown(t
         "ws://127.0.0.1:8700": {"version": "", "sources": ""},
     }
     assert snapshot["unknown_sources"] == ("ws://127.0.0.1:8700",)
+
+
+def test_a_record_says_the_sources_of_a_policy_and_marks_what_the_policy_states(
+    tmp_path: Path,
+) -> None:
+    script = tmp_path / "my_policy" / "policy.py"
+    script.parent.mkdir()
+    script.write_text("serve()")
+    command = ("/opt/own/bin/python", str(script))
+    policies = [
+        ReportedMethod(command=command, sources="aa", said_name="reach", said_version="1.2"),
+        ReportedMethod(command=command, sources="aa", said_name="reach", said_version="1.2"),
+        ReportedMethod(address="ws://127.0.0.1:8000"),
+    ]
+    ran = running_stack({}, {}, [], [], process_methods=policies)
+    snapshot = record_of(tmp_path, json.loads(json.dumps(asdict(ran)))).snapshot
+    assert snapshot["methods"] == {
+        "bin/python my_policy/policy.py": {
+            "version": "", "sources": "aa", "said_name": "reach", "said_version": "1.2"
+        },
+        "ws://127.0.0.1:8000": {"version": "", "sources": ""},
+    }  # fmt: skip
+    assert snapshot["unknown_sources"] == ("ws://127.0.0.1:8000",)
+    assert snapshot["digests"] == {"method file my_policy/policy.py": hashlib.sha256(b"serve()").hexdigest()}
 
 
 def test_a_record_says_the_sources_of_a_planner_in_its_own_process_or_that_they_are_unknown(tmp_path: Path) -> None:

@@ -105,8 +105,11 @@ class MethodClient:
     """Starts or connects to a method, and sends requests. After a fault, the next call starts or connects again.
 
     Attributes:
+        source: Location of the method.
         sources: SHA-256 of the sources that the method's process has imported; known after `start`, "" if the method
             does not report them.
+        said_name: Name that the method states about itself; known after `start`, "" if the method states none.
+        said_version: Version that the method states about itself, likewise.
         needs_camera: Whether requests must contain camera images; known after `start`.
 
     Args:
@@ -116,12 +119,12 @@ class MethodClient:
     """
 
     def __init__(self, source: MethodSource, kind: str, limits: MethodLimits) -> None:
-        self._source = source
+        self.source = source
         self._kind = kind
         self._limits = limits
         self._process: MethodProcess | None = None
         self._connection: ClientConnection | None = None
-        self.sources = ""
+        self.sources = self.said_name = self.said_version = ""
         self.needs_camera = False
 
     def start(self) -> None:
@@ -132,12 +135,12 @@ class MethodClient:
         """
         if self._connection is not None:
             return
-        if bool(self._source.command) == bool(self._source.address):
+        if bool(self.source.command) == bool(self.source.address):
             raise MethodStartError("the method needs either a command that starts it, or its address; set one of them")
         try:
-            if self._source.command:
-                self._process = MethodProcess(self._source.command)
-            self._connection = self._connect(self._process.address if self._process else self._source.address)
+            if self.source.command:
+                self._process = MethodProcess(self.source.command)
+            self._connection = self._connect(self._process.address if self._process else self.source.address)
         except Exception:
             self.close()
             raise
@@ -159,11 +162,11 @@ class MethodClient:
         self.start()
         started_s = time.perf_counter()
         encoded = pack(request)
-        if self._source.record_folder:
-            _record(encoded, Path(self._source.record_folder))
+        if self.source.record_folder:
+            _record(encoded, Path(self.source.record_folder))
         data = self._exchange(encoded, self._limits.call_s if limit_s is None else limit_s, is_cancelled)
         if isinstance(data, str):
-            if self._source.protocol == OPENPI:
+            if self.source.protocol == OPENPI:
                 self.close()  # the server closes the connection after the text
             raise MethodRaisedError(
                 f"the function of the method raised {data.strip().splitlines()[-1]}; its log has the traceback"
@@ -171,7 +174,7 @@ class MethodClient:
         message = unpack(data)
         total_s = time.perf_counter() - started_s
         try:
-            if self._source.protocol == OPENPI:
+            if self.source.protocol == OPENPI:
                 message = openpi_response(message, total_s)
             timing = message["server_timing"]
             method_s, queue_s = (1e-3 * float(timing[name]) for name in ("infer_ms", "queue_ms"))
@@ -230,7 +233,8 @@ class MethodClient:
 
     def _check_greeting(self, address: str, data: Any) -> None:
         greeting = unpack(data) if isinstance(data, bytes) else {}
-        if self._source.protocol == OPENPI:
+        self.said_name, self.said_version = (str(greeting.get(key, "")) for key in ("name", "method_version"))
+        if self.source.protocol == OPENPI:
             if not isinstance(data, bytes) or greeting.get("protocol") == PROTOCOL:
                 raise MethodVersionError(
                     f"the server at {address} is no openpi server; for a method of mbf_method, leave out openpi_keys"

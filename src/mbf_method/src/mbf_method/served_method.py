@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 import threading
 import time
 import traceback
@@ -68,6 +69,12 @@ class ServedMethod:
             required = self.result_type.__name__
             raise TypeError(f"{self.function.__name__} returned a {type(result).__name__}; it must return {required}")
         return result
+
+    @property
+    def version(self) -> str:
+        """Attribute `__version__` of the module with the function; "" without the attribute."""
+        module = sys.modules.get(self.function.__module__)
+        return str(getattr(module, "__version__", ""))
 
     def serve(self, port: int = DEFAULT_PORT, host: str = "127.0.0.1") -> None:
         """Serves the function until the process is interrupted.
@@ -144,6 +151,7 @@ class _Handler:
                         "version": VERSION,
                         "kind": self._method.kind,
                         "name": self._method.function.__name__,
+                        "method_version": self._method.version,
                         "needs_camera": self._method.needs_camera,
                         "sources": source_digest(),
                     }

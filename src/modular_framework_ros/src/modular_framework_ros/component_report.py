@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import rospy
 from std_msgs.msg import String
@@ -18,6 +18,25 @@ from modular_framework_ros.reported_figures import Figure
 TOPIC = "component_reports"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportedMethod:
+    """A method that worked in its own process.
+
+    Attributes:
+        command: Program and arguments that started the method; empty for a running method.
+        address: Address of a running method; "" for a command.
+        sources: SHA-256 of the sources that the process has imported; "" if the process does not report it.
+        said_name: Name that the method states about itself; not verified.
+        said_version: Version that the method states about itself; not verified.
+    """
+
+    command: tuple[str, ...] = ()
+    address: str = ""
+    sources: str = ""
+    said_name: str = ""
+    said_version: str = ""
+
+
 @dataclass
 class Work:
     """A running task of a component.
@@ -25,17 +44,20 @@ class Work:
     Attributes:
         figures: Values of the component's own figures, such as the number of candidates.
         reason: Reason of the failure; "" without a failure.
+        method: Method in its own process that worked; None without such a method.
     """
 
     figures: dict[Figure, float] = field(default_factory=dict)
     reason: str = ""
+    method: ReportedMethod | None = None
 
 
 class ComponentReporter:
     """Publishes ``component_reports`` (std_msgs/String, JSON): one message at the end of each task of a component.
 
     Keys: ``component``, ``name``, ``succeeded``, ``reason``, ``started`` and ``ended`` (ROS time [s]), ``wall_s`` (real
-    time [s]), ``figures`` (name to number, see `reported_figures`).
+    time [s]), ``figures`` (name to number, see `reported_figures`), and ``method`` (fields of `ReportedMethod`) after
+    the work of a method in its own process.
     """
 
     def __init__(self, component: str) -> None:
@@ -71,4 +93,6 @@ class ComponentReporter:
                 "wall_s": time.monotonic() - wall,
                 "figures": {figure.name: value for figure, value in work.figures.items()},
             }
+            if work.method is not None:
+                entry["method"] = asdict(work.method)
             publish(self._publisher, String(json.dumps(entry)))

@@ -20,7 +20,7 @@ from mbf_method.observation import Observation
 from mbf_method.openpi import openpi_request
 from modular_framework_core.grasping.ros_grasp_server import read_controllers
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_ros.reported_figures import Figure
+from modular_framework_ros.component_report import ReportedMethod, Work
 from modular_framework_ros.seeds import MAX_SEED, derived_seed, seed_parameter
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.manipulator_postures import posture_positions
@@ -102,11 +102,11 @@ class PolicyRun:
         self._time = SimulatedTime()
         self._step, self._start_s = 0, 0.0
 
-    def run(self, figures: dict[Figure, float]) -> None:
+    def run(self, work: Work) -> None:
         """Lets the policy drive until it is done or its time is over; the arm is held afterwards.
 
         Args:
-            figures: Receives the figures of the run.
+            work: Receives the figures of the run, and the method that the record names.
 
         Raises:
             MethodError: The policy returned no valid actions; the class of the error is the kind of fault.
@@ -116,9 +116,10 @@ class PolicyRun:
         """
         self._arm.connect()
         self._client.start()
+        work.method = _reported(self._client)
         self._start_s = rospy.get_time()
         try:
-            is_done = self._drive(PolicyFigures(figures, self._settings.rate_hz))
+            is_done = self._drive(PolicyFigures(work.figures, self._settings.rate_hz))
             self._settle()
         finally:
             self._arm.stop()
@@ -212,6 +213,17 @@ def _gripper(postures: tuple[str, ...], userdata: Any) -> PolicyGripper | None:
         return None
     opened, closed = (posture_positions(name) for name in postures)
     return PolicyGripper(opened, closed, userdata.manipulator_controller_client, userdata.max_torque)
+
+
+def _reported(client: MethodClient) -> ReportedMethod:
+    """Returns the report of a started method."""
+    return ReportedMethod(
+        command=client.source.command,
+        address=client.source.address,
+        sources=client.sources,
+        said_name=client.said_name,
+        said_version=client.said_version,
+    )
 
 
 def _seed(step: int) -> int:

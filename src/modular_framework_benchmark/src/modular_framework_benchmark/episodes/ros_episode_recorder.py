@@ -155,7 +155,9 @@ class EpisodeRecorder:
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]
         models = [placed.model for placed in request.objects]
-        answer["ran"] = asdict(running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans, models))
+        generators, methods = _publishers(GENERATION_SIGNAL), self._samples.process_methods()
+        ran = running_stack(parameters, controllers, generators, plans, models, process_methods=methods)
+        answer["ran"] = asdict(ran)
         self._store_part_end(request, answer, "recorded")
         return answer
 

@@ -33,6 +33,7 @@ from modular_framework_core.files.model_files import model_file
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
 from modular_framework_core.task_constructor.machine_files import machine_files
 from modular_framework_planning.plan_statistics import PlannerRun
+from modular_framework_ros.component_report import ReportedMethod
 from modular_framework_ros.connections.ros_node_calls import NodeCallError, node_address, process_id
 from modular_framework_ros.reported_figures import SOURCES_PARAMETER
 
@@ -55,6 +56,8 @@ def running_stack(
     generators: Iterable[str],
     plans: Iterable[Mapping[str, Any]],
     models: Iterable[str] = (),
+    *,
+    process_methods: Iterable[ReportedMethod] = (),
 ) -> UsedSoftware:
     """Returns the software of a stack, including the planners that ran.
 
@@ -64,15 +67,20 @@ def running_stack(
         generators: Names of the nodes that generate grasps.
         plans: Planning reports of move_group.
         models: Models of the placed objects: names, or absolute paths of their files.
+        process_methods: Methods in their own process that components report, such as policies.
     """
-    generators, controllers = list(generators), dict(controllers)
+    generators, controllers, process_methods = list(generators), dict(controllers), list(process_methods)
+    commands = [
+        *(_value(parameters, f"{node}/command") for node in generators),
+        *(method.command for method in process_methods),
+    ]
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
     software = UsedSoftware(
         methods={name: UsedMethod(version, digest) for name, (version, digest) in methods.items()},
         controllers=controllers,
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
-        digests=_digests(parameters, controllers, models) | _command_digests(parameters, generators),
+        digests=_digests(parameters, controllers, models) | _command_digests(commands),
         substitutions=(
             *solver_substitutions(named_solvers(_value(parameters, KINEMATICS_PARAMETER))),
             *detector_substitutions(next(filter(None, (str(_value(parameters, name)) for name in DETECTORS)), "")),
@@ -81,7 +89,10 @@ def running_stack(
     for node in generators:
         command, address, sources = (_value(parameters, f"{node}/{name}") for name in EXTERNAL_PARAMETERS)
         if name := method_name(command, address):
-            software = software.with_external_method(name, str(sources))
+            software = software.with_external_method(name, UsedMethod("", str(sources)))
+    for method in process_methods:
+        said = UsedMethod("", method.sources, method.said_name, method.said_version)
+        software = software.with_external_method(method_name(method.command, method.address), said)
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
     return software.with_plans(PlannerRun(**run) for run in runs)
@@ -107,9 +118,8 @@ def _digests(parameters: Mapping[str, Any], controllers: Iterable[str], models: 
     return {**robot_digests(urdf, srdf), **joint, **digests}
 
 
-def _command_digests(parameters: Mapping[str, Any], generators: Iterable[str]) -> dict[str, str]:
+def _command_digests(commands: Iterable[object]) -> dict[str, str]:
     """Returns the SHA-256 of each file in the commands of external methods, keyed by a description of the file."""
-    commands = [_value(parameters, f"{node}/command") for node in generators]
     paths = [path for command in commands for path in command_files(command)]
     return {f"method file {portable_name(path)}": file_digest(path) for path in paths}
 

@@ -19,6 +19,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from modular_framework_benchmark.episodes.ros_world import SIMULATION_NODE, TASK_NODE
+from modular_framework_benchmark.records.episode_settings import from_json
+from modular_framework_ros.component_report import ReportedMethod
 
 ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_framework_core/GraspActionGoal": "grasp"}
 """Component of an action, keyed by the type of its goal."""
@@ -85,6 +87,10 @@ class Samples:
             pairs = [(goal, self._results[number]) for number, goal in self._goals.items() if number in self._results]
         ended = [goal | result | {"wall": min(goal["wall"], result["wall_end"])} for goal, result in pairs]
         return sorted(ended, key=lambda each: (each["ros_end"], each["wall_end"]))
+
+    def process_methods(self) -> list[ReportedMethod]:
+        """Returns the methods in their own process that the reports of components name."""
+        return [from_json(ReportedMethod, report["method"]) for _, report in self.components if report.get("method")]
 
     def actions_ended(self) -> bool:
         """Returns whether all goals have a result, and all results have a goal."""

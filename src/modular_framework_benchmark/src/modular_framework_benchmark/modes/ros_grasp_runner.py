@@ -149,7 +149,7 @@ def _used_software(settings: GraspSettings, prepared: _GraspSetup) -> UsedSoftwa
     )
     if isinstance(prepared.method, ProcessMethod):
         name = method_name(parameters.get("command"), parameters.get("address"))
-        return software.with_external_method(name, prepared.method.sources)
+        return software.with_external_method(name, UsedMethod("", prepared.method.sources))
     return software
 
 

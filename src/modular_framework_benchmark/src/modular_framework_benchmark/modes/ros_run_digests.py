@@ -44,6 +44,7 @@ from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combi
 from modular_framework_core.files.model_files import model_file
 from modular_framework_core.launching.ros_launch_preview import leaves
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
+from modular_framework_core.task_constructor.machine_files import text_lists
 
 FOLDER_PARAMETERS = ("states_directory", "templates_directory")
 """Launch arguments that name folders of the user's code."""
@@ -129,7 +130,9 @@ def _file_digests(file: Path, model_path: str) -> Digests:
 
 
 def _commands(settings: EpisodeSettings) -> list[tuple[str, ...]]:
-    """Returns the commands of the external methods and planners in the modes without simulation."""
+    """Returns the commands of external methods and planners, and the lists in a task, such as commands of policies."""
+    if isinstance(settings, TaskSettings):
+        return [words for file in settings.files for words in text_lists(file)]
     parameters: Mapping[str, Any] = {}
     if isinstance(settings, PlanningSettings):
         parameters = leaves(dict(settings.parameters))

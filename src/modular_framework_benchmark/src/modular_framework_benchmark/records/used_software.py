@@ -39,10 +39,24 @@ class UsedPlanner:
 
 @dataclass(frozen=True, slots=True)
 class UsedMethod:
-    """A method: version of its package, and SHA-256 of its sources; both empty if unknown."""
+    """A method.
+
+    Attributes:
+        version: Version of its package; "" if unknown.
+        sources: SHA-256 of its sources; "" if unknown.
+        said_name: Name that its process states; "" for none.
+        said_version: Version that its process states; "" for none.
+    """
 
     version: str
     sources: str
+    said_name: str = ""
+    said_version: str = ""
+
+    def as_json(self) -> dict[str, str]:
+        """Returns version and sources, extended by the statements of the process."""
+        said = {"said_name": self.said_name, "said_version": self.said_version}
+        return {"version": self.version, "sources": self.sources, **{key: text for key, text in said.items() if text}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +67,8 @@ class UsedSoftware:
         planners: Planners, keyed by "PLANNER of PIPELINE".
         solver: Inverse kinematics methods; empty if no pose was solved.
         collision_checker: Classes of the collision checkers as `module/Class`; empty without a plan.
-        methods: Grasp generation methods, keyed by package; methods with their own process also by command or address.
+        methods: Grasp generation methods, keyed by package; methods with their own process, such as policies, by
+            command or address.
         unknown_sources: Methods and planners whose process does not report its sources.
         controllers: Types of the running controllers, keyed by name.
         physics_engine: Physics engine of the simulation.
@@ -83,18 +98,20 @@ class UsedSoftware:
 
     def as_json(self) -> dict[str, Any]:
         """Returns the entries of a snapshot."""
-        return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
+        return asdict(self) | {
+            "planners": {name: planner.as_json() for name, planner in self.planners.items()},
+            "methods": {name: method.as_json() for name, method in self.methods.items()},
+        }
 
-    def with_external_method(self, name: str, sources: str) -> UsedSoftware:
+    def with_external_method(self, name: str, method: UsedMethod) -> UsedSoftware:
         """Returns this object with a method that runs in its own process.
 
         Args:
             name: Command or address of the method.
-            sources: SHA-256 of the sources, as the process reports it; "" if unknown.
+            method: Method with the sources that its process reports.
         """
-        methods = {**self.methods, name: UsedMethod("", sources)}
-        unknown = self.unknown_sources if sources else (*self.unknown_sources, name)
-        return replace(self, methods=methods, unknown_sources=unknown)
+        unknown = {*self.unknown_sources, *([] if method.sources else [name])}
+        return replace(self, methods={**self.methods, name: method}, unknown_sources=tuple(sorted(unknown)))
 
     def with_plans(self, runs: Iterable[PlannerRun]) -> UsedSoftware:
         """Returns this object with the planners of the given runs.

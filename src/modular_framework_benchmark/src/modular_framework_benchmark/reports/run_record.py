@@ -159,7 +159,8 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
         if methods:
             yield (
                 f"{count_phrase(episodes, 'episode')} ran with a method or planner whose sources are unknown, so a "
-                f"change of it is not noticed: {', '.join(methods)}. Update its package mbf_method."
+                f"change of it is not noticed: {', '.join(methods)}. Update its package mbf_method; an openpi "
+                "server does not report its sources."
             )
     tries = [text for value, episodes in snapshots.get("earlier_tries", ()) for text in value * episodes]
     if tries:

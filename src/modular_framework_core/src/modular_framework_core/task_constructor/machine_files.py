@@ -91,18 +91,37 @@ def machine_files(script: Path) -> tuple[Path, ...]:
             root = located_yaml.load(pending.pop(), FaultList())
         except TaskFault:
             continue
-        new = [file for body in _mappings(root) if (file := machine_file(body)) is not None and file not in files]
+        bodies = (node for node in _nodes(root) if isinstance(node, Mapping))
+        new = [file for body in bodies if (file := machine_file(body)) is not None and file not in files]
         files |= dict.fromkeys(new)
         pending += new
     return tuple(files)
 
 
-def _mappings(node: Node) -> Iterator[Mapping]:
+@lru_cache(maxsize=64)
+def text_lists(file: Path) -> tuple[tuple[str, ...], ...]:
+    """Returns the lists of texts in a task or a machine, such as the command of a policy; none if it is unreadable.
+
+    The cache makes the same assumption as the cache of `machine_files`.
+
+    Args:
+        file: Path of the task or machine.
+    """
+    try:
+        root = located_yaml.load(file, FaultList())
+    except TaskFault:
+        return ()
+    lists = (node.items for node in _nodes(root) if isinstance(node, Sequence))
+    return tuple(tuple(str(item.value) for item in items if isinstance(item, Scalar)) for items in lists)
+
+
+def _nodes(node: Node) -> Iterator[Node]:
+    """Yields a node and all nodes in it."""
+    yield node
     match node:
         case Mapping(entries=entries):
-            yield node
             for value in entries.values():
-                yield from _mappings(value)
+                yield from _nodes(value)
         case Sequence(items=items):
             for item in items:
-                yield from _mappings(item)
+                yield from _nodes(item)

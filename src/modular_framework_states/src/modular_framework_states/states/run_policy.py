@@ -129,7 +129,7 @@ class RunPolicy(FrameworkState):
         client = MethodClient(self._source, ACTIONS, self._limits)
         with self._reporter.work("run_policy") as work:
             try:
-                PolicyRun(self, userdata, self._settings, self._cameras, client).run(work.figures)
+                PolicyRun(self, userdata, self._settings, self._cameras, client).run(work)
             except MethodError as error:
                 work.figures[POLICY_FAULT] = float(error.fault)
                 work.reason = f"the policy failed: {error}"
