@@ -230,6 +230,11 @@ def test_a_missing_joint_camera_or_posture_is_named(robot: Robot, options: dict[
         ({"command": EXAMPLE, "openpi_keys": {"prompt": "prompt"}}, "openpi_keys needs the address"),
         ({"address": "ws://127.0.0.1:1", "openpi_keys": {"side": "image"}}, "openpi_keys names ['side']"),
         ({"command": EXAMPLE, "gripper": ["open"]}, "gripper has 1 items"),
+        ({"command": EXAMPLE, "frame": "palm"}, "frame needs the actions end_effector_deltas"),
+        (
+            {"command": EXAMPLE, "actions": "end_effector_deltas", "joints": ["elbow"]},
+            "end_effector_deltas moves all joints of the planning group; remove joints",
+        ),
         ({"command": EXAMPLE, "horizon": 2, "chunk": 3}, "chunk is 3; it must be at most the horizon, 2"),
     ],
 )

@@ -29,6 +29,7 @@ from mbf_method.errors import (
 from mbf_method.method_client import MethodClient, MethodLimits, MethodSource
 from mbf_method.method_process import MethodProcess
 from mbf_method.served_method import GRASPS
+from mbf_method.wire import VERSION
 
 FAULTY_METHOD = str(Path(__file__).parent / "faulty_method.py")
 FAULTY_SEED = 13
@@ -116,7 +117,11 @@ def test_a_fault_ends_the_call_and_the_next_call_succeeds(
     [
         ("exits", MethodStartError, "exited with code 3 before the method was ready"),
         ("never listens", MethodStartError, "not ready within 2 s"),
-        ("has another version", MethodVersionError, "version 2, kind 'grasps'; required: 'mbf_method', 1"),
+        (
+            "has another version",
+            MethodVersionError,
+            f"version {VERSION + 1}, kind 'grasps'; required: 'mbf_method', {VERSION}",
+        ),
     ],
 )
 def test_a_method_that_does_not_start_has_its_cause(
@@ -144,7 +149,7 @@ def test_a_wrong_source_has_its_cause(source: MethodSource, cause: str) -> None:
 
 def test_a_method_of_another_kind_is_refused(make_client: MakeClient) -> None:
     client = MethodClient(MethodSource(command=(sys.executable, FAULTY_METHOD, "none")), "policy", MethodLimits())
-    with pytest.raises(MethodVersionError, match="kind 'grasps'; required: 'mbf_method', 1, 'policy'"):
+    with pytest.raises(MethodVersionError, match=f"kind 'grasps'; required: 'mbf_method', {VERSION}, 'policy'"):
         client.start()
     assert not children()
 

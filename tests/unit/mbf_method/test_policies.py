@@ -32,6 +32,7 @@ from mbf_method.errors import (
 )
 from mbf_method.method_checks import check_policy, local_call
 from mbf_method.method_client import MethodClient, MethodLimits, MethodSource
+from mbf_method.observation import END_EFFECTOR_COLUMNS
 from mbf_method.openpi import openpi_request
 from mbf_method.sample_inputs import observations
 from mbf_method.served_method import ACTIONS
@@ -136,6 +137,62 @@ def test_only_the_actions_that_exceed_a_limit_count_as_clipped() -> None:
     targets = limited_targets(actions, SPEC, np.zeros(4))
     assert targets.clipped.tolist() == [False, True, False]
     assert targets.values[:, 0] == pytest.approx([0.1, 0.3, 0.3])
+
+
+ACCELERATING = replace(SPEC, max_acceleration=np.array([10.0, 10.0, 10.0, np.inf]))
+
+
+@pytest.mark.parametrize(
+    ("before", "position", "fault", "limited"),
+    [
+        (0.0, 0.1, "", 0.1),
+        (0.0, 0.15, r"from 0.0000 to 0.1500 with 15.0000 per s\^2; the maximum acceleration is 10.0000 per s\^2", 0.1),
+        (-0.1, 0.2, "", 0.2),
+        (-0.2, 0.05, r"with 15.0000 per s\^2", 0.1),
+        (-0.1, 0.25, "at 2.5000 per s; the maximum velocity is 2", 0.2),
+    ],
+)
+def test_the_acceleration_between_successive_targets_is_limited(
+    before: float, position: float, fault: str, limited: float
+) -> None:
+    actions, zeros = np.array([[position, 0.0, 0.0, 0.0]]), np.zeros(4)
+    targets = limited_targets(actions, ACCELERATING, zeros, np.array([before, 0.0, 0.0, 0.0]))
+    assert bool(targets.fault) == bool(fault) and re.search(fault, targets.fault)
+    assert targets.values[0, 0] == pytest.approx(limited)
+
+
+def test_a_start_at_rest_has_no_velocity() -> None:
+    actions = np.array([[0.1, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.0]])
+    targets = limited_targets(actions, ACCELERATING, np.zeros(4))
+    assert targets.clipped.tolist() == [False, False, True]
+    assert targets.values[:, 0] == pytest.approx([0.1, 0.3, 0.4])
+
+
+TIP_SPEC = replace(
+    SPEC, kind="end_effector_deltas", names=(*END_EFFECTOR_COLUMNS, "gripper"), link="tool", frame="base"
+)
+TIP_OBSERVATION = replace(FIRST, actions=TIP_SPEC, end_effector=np.eye(4))
+
+
+def test_an_observation_of_an_end_effector_survives_its_encoding() -> None:
+    decoded = Observation.from_message(unpack(pack(TIP_OBSERVATION)))
+    assert (decoded.actions.link, decoded.actions.frame, decoded.actions.joint_names) == ("tool", "base", ())
+    assert decoded.end_effector.tolist() == np.eye(4).tolist()
+
+
+@pytest.mark.parametrize(
+    ("action", "fault"),
+    [
+        ([0.005, 0.0, 0.0, 0.0, 0.0, 0.05, 1.0], ""),
+        ([5.0, 0.0, 0.0, 0.0, 0.0, 0.05, 1.0], "moves the end effector at 50 m/s; the columns must be in m"),
+        ([0.005, 0.0, 0.0, 0.0, 0.0, 3.0, 1.0], "turns the end effector at 30 rad/s; the columns must be in rad"),
+    ],
+)
+def test_wrong_units_of_end_effector_deltas_are_named(action: list[float], fault: str) -> None:
+    moved = policy(lambda observation: Actions(np.tile(action, (SPEC.horizon, 1))))
+    findings = check_policy(local_call(moved), [TIP_OBSERVATION])
+    assert [text for text in findings.faults if fault in text] == list(findings.faults)
+    assert bool(findings.faults) == bool(fault)
 
 
 @pytest.mark.parametrize(

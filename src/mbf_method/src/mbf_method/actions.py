@@ -22,6 +22,7 @@ class Actions:
     Attributes:
         actions: Actions at the rate of the observation's `ActionSpec`, shape (horizon, a). The joint columns are target
             positions [rad or m], velocities [rad/s or m/s], or differences from the previous target [rad or m]. The
+            columns of the end effector are a translation [m] and a rotation vector [rad] from the previous target. The
             gripper column is a fraction, from 0 (open) to 1 (closed). No action means that the task is done.
     """
 
@@ -73,26 +74,33 @@ def checked_actions(message: Mapping[str, Any], spec: ActionSpec) -> np.ndarray:
     return actions.astype(np.float64)
 
 
-def limited_targets(actions: np.ndarray, spec: ActionSpec, start: np.ndarray) -> Targets:
-    """Converts actions to target positions within the position and velocity limits.
+def limited_targets(
+    actions: np.ndarray, spec: ActionSpec, start: np.ndarray, before: np.ndarray | None = None
+) -> Targets:
+    """Converts joint actions to target positions within the position, velocity and acceleration limits.
+
+    Velocities and accelerations are differences between successive targets.
 
     Args:
         actions: Checked actions, shape (n, a).
-        spec: Required actions.
+        spec: Required actions with joint columns.
         start: Target before the first action, shape (a,).
+        before: Target before `start`, shape (a,); None for a start at rest.
     """
     values, clipped, fault, previous = np.zeros(actions.shape), np.zeros(len(actions), bool), "", start
-    reach = spec.max_velocity / spec.rate_hz
+    step = np.zeros(len(start)) if before is None else start - before
+    reach, change = spec.max_velocity / spec.rate_hz, spec.max_acceleration / spec.rate_hz**2
     for index, action in enumerate(actions):
         wanted = _target(action, spec, previous)
-        reachable = np.clip(wanted, previous - reach, previous + reach)
+        lower, upper = np.maximum(-reach, step - change), np.minimum(reach, step + change)
+        reachable = np.clip(wanted, previous + lower, previous + upper)
         values[index] = np.clip(reachable, spec.lower, spec.upper)
         excess = np.abs(wanted - values[index])
         clipped[index] = excess.max() > LIMIT_TOLERANCE
         if clipped[index] and not fault:
             worst = int(np.argmax(excess))
-            fault = _fault_text(index, worst, spec, (previous[worst], wanted[worst]))
-        previous = values[index]
+            fault = _fault_text(index, worst, spec, (previous - step, previous, wanted))
+        step, previous = values[index] - previous, values[index]
     return Targets(values, clipped, fault)
 
 
@@ -105,14 +113,17 @@ def _target(action: np.ndarray, spec: ActionSpec, previous: np.ndarray) -> np.nd
     return target
 
 
-def _fault_text(index: int, column: int, spec: ActionSpec, motion: tuple[float, float]) -> str:
-    """Returns which limit a motion of a column, given as start and target, exceeds."""
-    start, target = motion
+def _fault_text(index: int, column: int, spec: ActionSpec, motion: tuple[np.ndarray, ...]) -> str:
+    """Returns the limit that a column exceeds in a motion, given as the target before, the start and the target."""
+    before, start, target = (float(positions[column]) for positions in motion)
     name, lower, upper = spec.names[column], spec.lower[column], spec.upper[column]
     if not lower - LIMIT_TOLERANCE <= target <= upper + LIMIT_TOLERANCE:
         return f"actions[{index}] moves {name} to {target:.4f}; it must be from {lower:.4f} to {upper:.4f}"
-    velocity = abs(target - start) * spec.rate_hz
-    return (
-        f"actions[{index}] moves {name} from {start:.4f} to {target:.4f} at {velocity:.4f} per s; the maximum velocity "
-        f"is {spec.max_velocity[column]:.4f} per s"
-    )
+    velocity = (target - start) * spec.rate_hz
+    move = f"actions[{index}] moves {name} from {start:.4f} to {target:.4f}"
+    if abs(target - start) > spec.max_velocity[column] / spec.rate_hz + LIMIT_TOLERANCE:
+        limit = spec.max_velocity[column]
+        return f"{move} at {abs(velocity):.4f} per s; the maximum velocity is {limit:.4f} per s"
+    acceleration = abs(velocity - (start - before) * spec.rate_hz) * spec.rate_hz
+    limit = spec.max_acceleration[column]
+    return f"{move} with {acceleration:.4f} per s^2; the maximum acceleration is {limit:.4f} per s^2"

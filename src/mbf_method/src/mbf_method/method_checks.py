@@ -18,7 +18,7 @@ from mbf_method.errors import InvalidOutputError, MethodError
 from mbf_method.grasp_request import GraspRequest
 from mbf_method.grasps import Grasps, checked_grasps
 from mbf_method.joint_path import END_TOLERANCE, checked_path
-from mbf_method.observation import ACTION_KINDS, GRIPPER_COLUMN, Observation
+from mbf_method.observation import END_EFFECTOR_DELTAS, GRIPPER_COLUMN, JOINT_KINDS, ActionSpec, Observation
 from mbf_method.path_request import PathRequest
 from mbf_method.served_method import ServedMethod
 from mbf_method.wire import pack, unpack
@@ -32,6 +32,8 @@ REQUIRED_FRACTION = 0.5
 SUGGESTED_FRACTION = 0.9
 """Fraction of the grasps that a suggested correction must repair."""
 WIDTH_TOLERANCE_M = 0.01
+MAX_SPEED_M_S, MAX_TURN_RAD_S = 5.0, 10.0
+"""Speeds of an end effector above which deltas belong to another unit."""
 SUPPORT_TOLERANCE_M = 0.001
 
 Call = Callable[[Any], Mapping[str, Any]]
@@ -113,6 +115,9 @@ def check_policy(call: Call, inputs: Sequence[Observation]) -> Findings:
     def check(observation: Observation, name: str, faults: list[str], notes: list[str]) -> bool:
         actions = checked_actions(_repeated(call, observation, name, faults, notes), observation.actions)
         notes.append(f"{name}: {len(actions)} actions." if len(actions) else f"{name}: the task is done.")
+        if observation.actions.kind == END_EFFECTOR_DELTAS:
+            faults += [f"{name}: {text}." for text in _displacement_faults(actions, observation.actions)]
+            return bool(len(actions))
         targets = limited_targets(actions, observation.actions, _start(observation))
         if targets.fault:
             faults.append(f"{name}: {targets.fault}{_action_hint(actions, observation)}.")
@@ -310,6 +315,19 @@ def _start(observation: Observation) -> np.ndarray:
     return np.append(observation.robot.positions, [observation.gripper] if has_gripper else [])
 
 
+def _displacement_faults(actions: np.ndarray, spec: ActionSpec) -> list[str]:
+    """Returns the likely faults in the units of end-effector deltas."""
+    faults = []
+    for what, columns, limit, unit in (
+        ("moves", slice(0, 3), MAX_SPEED_M_S, "m"),
+        ("turns", slice(3, 6), MAX_TURN_RAD_S, "rad"),
+    ):
+        speed = np.linalg.norm(actions[:, columns], axis=1).max(initial=0.0) * spec.rate_hz
+        if speed > limit:
+            faults.append(f"an action {what} the end effector at {speed:.4g} {unit}/s; the columns must be in {unit}")
+    return faults
+
+
 def _action_hint(actions: np.ndarray, observation: Observation) -> str:
     """Returns the likely reason why actions exceed the limits; "" for none."""
     spec, joints = observation.actions, len(observation.actions.joint_names)
@@ -319,7 +337,7 @@ def _action_hint(actions: np.ndarray, observation: Observation) -> str:
         return "; the joint columns seem to be in degrees, they must be in radians"
     suitable = [
         kind
-        for kind in ACTION_KINDS
+        for kind in JOINT_KINDS
         if not limited_targets(actions, replace(spec, kind=kind), _start(observation)).fault
     ]
     return f"; the actions seem to be {' or '.join(suitable)}, they must be {spec.kind}" if suitable else ""

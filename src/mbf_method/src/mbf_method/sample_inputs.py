@@ -63,9 +63,12 @@ def observations() -> list[Observation]:
     """Returns observations of a planar arm with a gripper and a camera in two states."""
     box = _box("box", (0.04, 0.07, 0.1), (0.4, 0.1), 0.0)
     view = _view_from_above(box)
-    gripper = ([0.0], [1.0], [np.inf])
-    lower, upper, velocity = (np.append(np.full(3, limit), end) for limit, end in zip((-2.5, 2.5, 2.0), gripper))
-    spec = ActionSpec("positions", (*ARM_JOINTS, GRIPPER_COLUMN), HORIZON, POLICY_RATE_HZ, lower, upper, velocity)
+    gripper = ([0.0], [1.0], [np.inf], [np.inf])
+    lower, upper, velocity, acceleration = (
+        np.append(np.full(3, limit), end) for limit, end in zip((-2.5, 2.5, 2.0, np.inf), gripper)
+    )
+    names = (*ARM_JOINTS, GRIPPER_COLUMN)
+    spec = ActionSpec("positions", names, HORIZON, POLICY_RATE_HZ, lower, upper, velocity, acceleration)
     first = Observation(
         robot=RobotState(ARM_JOINTS, np.array(START)),
         gripper=0.0,

@@ -14,7 +14,7 @@ from mbf_method.errors import InvalidOutputError
 PROTOCOL = "mbf_method"
 OPENPI = "openpi"
 """Protocol of policy servers that send metadata first and do not state a version."""
-VERSION = 1
+VERSION = 2
 """Version of the messages; method and framework must have the same version."""
 REFUSED_KINDS = "VOc"
 """NumPy dtype kinds without an encoding: structures, Python objects, complex numbers."""

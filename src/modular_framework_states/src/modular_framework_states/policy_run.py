@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from mbf_method.actions import checked_actions, limited_targets
 from mbf_method.errors import InvalidOutputError
 from mbf_method.grasp_request import RobotState
 from mbf_method.method_client import MethodClient
-from mbf_method.observation import Observation
+from mbf_method.observation import END_EFFECTOR_COLUMNS, END_EFFECTOR_DELTAS, Observation
 from mbf_method.openpi import openpi_request
 from modular_framework_core.grasping.ros_grasp_server import read_controllers
 from modular_framework_core.state_api.framework_state import FrameworkState
@@ -24,11 +24,16 @@ from modular_framework_ros.component_report import ReportedMethod, Work
 from modular_framework_ros.seeds import MAX_SEED, derived_seed, seed_parameter
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.manipulator_postures import posture_positions
-from modular_framework_states.policy_actions import action_spec
+from modular_framework_states.policy_actions import end_effector_spec, joint_action_spec
 from modular_framework_states.policy_arm import PolicyArm, PolicyMotionError, trajectory_action
 from modular_framework_states.policy_cameras import PolicyCameras
 from modular_framework_states.policy_figures import PolicyFigures
 from modular_framework_states.policy_gripper import PolicyGripper
+
+if TYPE_CHECKING:
+    from modular_framework_states.policy_end_effector import EndEffector
+
+Array = npt.NDArray[np.float64]
 
 PERIOD_S = 0.005
 MOTION_WAIT_S = 10.0
@@ -42,12 +47,14 @@ class PolicySettings:
     Attributes:
         openpi_keys: Keys of an openpi-style server, by field; empty for a policy of mbf_method.
         prompt: Instruction for the policy.
-        kind: Meaning of the joint columns.
+        kind: Meaning of the columns.
+        frame: Frame of end-effector deltas; "" for the planning frame.
         joints: Joints that the policy moves; empty for all joints of the planning group.
         postures: Open and closed posture of the gripper; empty without a gripper column.
         horizon: Number of actions of a chunk.
         rate_hz: Number of actions per second.
         executed: Number of actions that run before the next query.
+        accelerates: Whether the acceleration limits of the joints count.
         clamp: Whether targets outside the limits are moved to the limits.
         max_duration_s: Maximum duration of the policy [s].
         must_finish: Whether the policy must be done within the maximum duration.
@@ -57,11 +64,13 @@ class PolicySettings:
     openpi_keys: Mapping[str, str]
     prompt: str
     kind: str
+    frame: str
     joints: tuple[str, ...]
     postures: tuple[str, ...]
     horizon: int
     rate_hz: float
     executed: int
+    accelerates: bool
     clamp: bool
     max_duration_s: float
     must_finish: bool
@@ -90,17 +99,28 @@ class PolicyRun:
         self._state, self._settings, self._cameras, self._client = state, settings, cameras, client
         self._commander = userdata.arm_commander
         self._gripper = _gripper(settings.postures, userdata)
-        self._spec = action_spec(
+        moves_tip = settings.kind == END_EFFECTOR_DELTAS
+        self._joints = self._spec = joint_action_spec(
             self._commander.group,
             settings.joints,
-            settings.kind,
+            "positions" if moves_tip else settings.kind,
             has_gripper=self._gripper is not None,
             timing=(settings.horizon, settings.rate_hz),
+            accelerates=settings.accelerates,
         )
-        joints = self._spec.joint_names
+        joints = self._joints.joint_names
+        self._end_effector = self._make_end_effector(joints) if moves_tip else None
+        if self._end_effector is not None:
+            self._spec = end_effector_spec(self._joints, self._end_effector.link, self._end_effector.frame)
         self._arm = PolicyArm(trajectory_action(read_controllers(), joints), joints, settings.rate_hz)
         self._time = SimulatedTime()
         self._step, self._start_s = 0, 0.0
+
+    def _make_end_effector(self, joints: Sequence[str]) -> EndEffector:
+        from modular_framework_states.policy_end_effector import EndEffector, load_solver  # loads the planner
+
+        solver = load_solver(self._commander.group.name)
+        return EndEffector(solver, joints, self._settings.frame, self._commander.positions_of)
 
     def run(self, work: Work) -> None:
         """Lets the policy drive until it is done or its time is over; the arm is held afterwards.
@@ -128,7 +148,7 @@ class PolicyRun:
 
     def _drive(self, figures: PolicyFigures) -> bool:
         """Executes chunks; returns whether the policy is done."""
-        target: npt.NDArray[np.float64] | None = None
+        target = before = np.zeros(0)
         while not self._state.stop_requested():
             left = (self._settings.max_duration_s - (rospy.get_time() - self._start_s)) * self._settings.rate_hz
             if left < 1.0:
@@ -136,30 +156,32 @@ class PolicyRun:
             with self._time.held("run_policy"):
                 observation = self._observation()
                 actions = self._actions(observation, figures)
-            if not len(actions):
-                return True
-            if target is None:
-                gripper = [] if self._gripper is None else [observation.gripper]
-                target = np.append(observation.robot.positions, gripper)
-            targets = limited_targets(actions, self._spec, target)
+                if not len(actions):
+                    return True
+                if not self._step:
+                    gripper = [] if self._gripper is None else [observation.gripper]
+                    target = before = np.append(observation.robot.positions, gripper)
+                targets = limited_targets(self._joint_actions(actions, target), self._joints, target, before)
             if targets.fault and not self._settings.clamp:
                 raise InvalidOutputError(targets.fault)
             executed = targets.values[: int(min(self._settings.executed, left))]
             self._execute(executed)
-            target = executed[-1]
+            before, target = (target, *executed)[-2:]
             self._step += len(executed)
             figures.add_chunk(targets.clipped[: len(executed)])
         return False
 
     def _observation(self) -> Observation:
-        joints, setting = self._spec.joint_names, self._settings
+        joints, setting = self._joints.joint_names, self._settings
         cameras = self._cameras.take(setting.camera_timeout_s)
         observed = [*joints] if self._gripper is None else [*joints, self._gripper.observed_joint]
         positions = self._commander.positions_of(observed)
         if missing := [name for name in observed if name not in positions]:
             raise PolicyMotionError(f"topic '{rospy.resolve_name('joint_states')}' lacks the joints {missing}")
+        robot = RobotState(joints, np.array([positions[name] for name in joints]))
+        tip = self._end_effector
         return Observation(
-            robot=RobotState(joints, np.array([positions[name] for name in joints])),
+            robot=robot,
             gripper=0.0 if self._gripper is None else self._gripper.fraction_at(positions[observed[-1]]),
             cameras=cameras,
             prompt=setting.prompt,
@@ -167,9 +189,10 @@ class PolicyRun:
             step=self._step,
             actions=self._spec,
             seed=_seed(self._step),
+            end_effector=np.zeros((0, 0)) if tip is None else tip.pose(robot.positions),
         )
 
-    def _actions(self, observation: Observation, figures: PolicyFigures) -> npt.NDArray[np.float64]:
+    def _actions(self, observation: Observation, figures: PolicyFigures) -> Array:
         """Returns the checked actions of the policy, and adds the query to the figures."""
         keys = self._settings.openpi_keys
         request = openpi_request(observation, keys) if keys else observation
@@ -177,9 +200,22 @@ class PolicyRun:
         figures.add_query(result.times)
         return checked_actions(result.message, self._spec)
 
-    def _execute(self, targets: npt.NDArray[np.float64]) -> None:
+    def _joint_actions(self, actions: Array, target: Array) -> Array:
+        """Returns the actions with joint columns.
+
+        Args:
+            actions: Checked actions, shape (n, a).
+            target: Target before the first action, shape (j,) or (j + 1,) with a gripper.
+        """
+        if self._end_effector is None:
+            return actions
+        columns = len(END_EFFECTOR_COLUMNS)
+        start = target[: len(self._joints.joint_names)]
+        return np.hstack([self._end_effector.follow(actions[:, :columns], start), actions[:, columns:]])
+
+    def _execute(self, targets: Array) -> None:
         """Executes targets, shape (n, a), and returns at the time of the last target."""
-        joints, next_row = len(self._spec.joint_names), 0
+        joints, next_row = len(self._joints.joint_names), 0
         self._arm.start(targets[:, :joints])
 
         def is_over() -> bool:

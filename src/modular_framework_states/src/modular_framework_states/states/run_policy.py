@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Unpack
 
 from mbf_method.errors import CallCancelledError, MethodError
 from mbf_method.method_client import MethodClient, MethodLimits, MethodSource
+from mbf_method.observation import END_EFFECTOR_DELTAS
 from mbf_method.openpi import openpi_fields
 from mbf_method.served_method import ACTIONS
 from mbf_method.wire import OPENPI, PROTOCOL
@@ -32,7 +33,7 @@ class RunPolicy(FrameworkState):
 
     The policy receives camera images and joint positions, and returns a chunk of actions. The controller of the arm
     executes the first actions of the chunk at ``rate`` and holds the last target until the next chunk. A target outside
-    the position or velocity limits ends the state without a motion, unless ``clamp`` is true.
+    the limits of a joint ends the state without a motion, unless ``clamp`` is true.
 
     Args:
         command: Program and arguments that start the policy, without a shell; the process ends with the state.
@@ -42,13 +43,16 @@ class RunPolicy(FrameworkState):
         cameras: Topics of colour images, by the name of the camera.
         depth_cameras: Topics of depth images, by the name of the camera.
         prompt: Instruction for the policy.
-        actions: Meaning of the joint columns: positions, velocities, or deltas (differences of successive positions).
+        actions: Meaning of the columns: joint positions, velocities or deltas (differences of successive positions), or
+            end_effector_deltas (translation [m] and rotation vector [rad] of the tip link from the previous target).
+        frame: Planning frame or link whose axes end_effector_deltas use; empty for the planning frame.
         joints: Joints that the policy moves, in the order of the columns; empty for all joints of the planning group.
         gripper: Open and closed posture, states of the manipulator's planning group. The last column is then the
             gripper, from 0 (open) to 1 (closed). Empty if the policy has no gripper column.
         rate: Actions per second [Hz].
         horizon: Number of actions in each chunk.
         chunk: Number of actions that run before the next query; 0 for the whole chunk.
+        acceleration_limits: Whether the acceleration limits of the joints count, between successive targets.
         clamp: Whether targets outside the limits are moved to the limits.
         max_duration: Maximum duration of the policy [s].
         must_finish: Whether the policy must be done within ``max_duration``.
@@ -70,12 +74,14 @@ class RunPolicy(FrameworkState):
         cameras: Mapping[str, str] | None = None,
         depth_cameras: Mapping[str, str] | None = None,
         prompt: str = "",
-        actions: Literal["positions", "velocities", "deltas"] = "positions",
+        actions: Literal["positions", "velocities", "deltas", "end_effector_deltas"] = "positions",
+        frame: str = "",
         joints: Sequence[str] = (),
         gripper: Annotated[Sequence[str], Named("posture")] = (),
         rate: Positive = 10.0,
         horizon: Annotated[int, Limits(at_least=1, at_most=10000)] = 1,
         chunk: Annotated[int, Limits(at_least=0, at_most=10000)] = 0,
+        acceleration_limits: bool = False,
         clamp: bool = False,
         max_duration: Positive = 60.0,
         must_finish: bool = False,
@@ -92,11 +98,13 @@ class RunPolicy(FrameworkState):
             openpi_keys=dict(openpi_keys or {}),
             prompt=prompt,
             kind=actions,
+            frame=frame,
             joints=tuple(joints),
             postures=tuple(gripper),
             horizon=int(horizon),
             rate_hz=float(rate),
             executed=int(chunk or horizon),
+            accelerates=bool(acceleration_limits),
             clamp=bool(clamp),
             max_duration_s=float(max_duration),
             must_finish=bool(must_finish),
@@ -118,6 +126,10 @@ class RunPolicy(FrameworkState):
             faults.append("openpi_keys needs the address of a server")
         if unknown := sorted(set(settings.openpi_keys) - set(fields)):
             faults.append(f"openpi_keys names {unknown}; allowed: {', '.join(fields)}")
+        if settings.kind == END_EFFECTOR_DELTAS and settings.joints:
+            faults.append("end_effector_deltas moves all joints of the planning group; remove joints")
+        if settings.kind != END_EFFECTOR_DELTAS and settings.frame:
+            faults.append("frame needs the actions end_effector_deltas")
         if len(settings.postures) not in (0, 2):
             faults.append(f"gripper has {len(settings.postures)} items; give an open and a closed posture")
         if settings.executed > settings.horizon:
