@@ -12,8 +12,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import rospy
+from control_msgs.msg import JointTrajectoryControllerState
 from controller_manager_msgs.srv import LoadController, SwitchController
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
@@ -22,11 +24,14 @@ from websockets.sync.server import ServerConnection, serve
 import smach
 from mbf_method.errors import MethodFault
 from mbf_method.wire import pack, unpack
+from modular_framework_benchmark.results.lerobot_dataset import LeRobotWriter
+from modular_framework_benchmark.results.lerobot_frames import read_frames
 from modular_framework_core.commander.robot_groups import read_group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.msg import GraspAction
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_until
+from modular_framework_states.policy_arm import PolicyArm
 from modular_framework_states.states.run_policy import RunPolicy
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -34,6 +39,8 @@ PYTHON = ["/usr/bin/env", f"PYTHONPATH={ROOT / 'src/mbf_method/src'}", sys.execu
 EXAMPLE = [*PYTHON, str(ROOT / "docs/examples/my_policy.py")]
 FAULTY = ROOT / "tests/unit/mbf_method/faulty_policy.py"
 CAMERA_TOPIC = "front/image_raw"
+ARM = ("shoulder", "elbow")
+REPLAY_RATE_HZ = 30
 
 
 def faulty(fault: str) -> list[str]:
@@ -51,10 +58,16 @@ class Robot:
         rospy.Subscriber("component_reports", String, lambda message: self.reports.append(json.loads(message.data)))
         self.commander = SimpleNamespace(group=read_group(urdf, srdf, "arm"), positions_of=self._monitor.positions)
         self.gripper = SteadyActionClient("moveit_grasp_action_server", GraspAction)
+        self._arm = PolicyArm("arm/follow_joint_trajectory", ARM, 0.5)
+        self._arm.connect()
         assert wait_until(lambda: len(self.positions()) == 3, 60.0)
 
     def positions(self) -> dict[str, float]:
         return self._monitor.positions(["shoulder", "elbow", "finger"])
+
+    def move_to(self, positions: list[float]) -> None:
+        self._arm.start(np.array([positions]))
+        assert wait_until(self._arm.has_ended, 30.0) and self._arm.fault() == ""
 
     def comes_to_rest(self) -> bool:
         return self._monitor.wait_for_rest(["shoulder", "elbow"], lambda: False)
@@ -226,11 +239,13 @@ def test_a_missing_joint_camera_or_posture_is_named(robot: Robot, options: dict[
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({}, "give either command or address"),
+        ({}, "give either command, address or dataset"),
         ({"command": EXAMPLE, "openpi_keys": {"prompt": "prompt"}}, "openpi_keys needs the address"),
         ({"address": "ws://127.0.0.1:1", "openpi_keys": {"side": "image"}}, "openpi_keys names ['side']"),
         ({"command": EXAMPLE, "gripper": ["open"]}, "gripper has 1 items"),
         ({"command": EXAMPLE, "frame": "palm"}, "frame needs the actions end_effector_deltas"),
+        ({"command": EXAMPLE, "dataset": "picks"}, "give either command, address or dataset"),
+        ({"dataset": "picks", "actions": "deltas"}, "dataset needs the actions positions; actions is deltas"),
         (
             {"command": EXAMPLE, "actions": "end_effector_deltas", "joints": ["elbow"]},
             "end_effector_deltas moves all joints of the planning group; remove joints",
@@ -242,3 +257,43 @@ def test_options_that_exclude_each_other_are_refused(options: dict[str, Any], re
     with pytest.raises(ValueError) as refused:
         RunPolicy(**options)
     assert reason in str(refused.value)
+
+
+def test_an_exported_episode_is_replayed_to_the_same_joint_positions(robot: Robot, tmp_path: Path) -> None:
+    robot.move_to([0.0, 0.0])
+    samples: list[JointTrajectoryControllerState] = []
+    recorder = rospy.Subscriber("arm/state", JointTrajectoryControllerState, samples.append)
+    assert wait_until(lambda: bool(samples), 10.0)
+    assert robot.run(RunPolicy(command=EXAMPLE, rate=20.0, horizon=8, chunk=4, must_finish=True)) == "success"
+    assert robot.comes_to_rest()
+    recorder.unregister()
+    recorded = robot.positions()
+    assert recorded["shoulder"] == pytest.approx(0.4, abs=0.01)
+
+    export_motion(samples, tmp_path / "dataset")
+    robot.move_to([0.0, 0.0])
+    state = RunPolicy(dataset=str(tmp_path / "dataset"), rate=REPLAY_RATE_HZ, horizon=10, must_finish=True)
+    assert robot.run(state) == "success", state.reason
+    assert robot.comes_to_rest()
+    replayed = robot.positions()
+    assert [replayed[name] for name in ARM] == pytest.approx([recorded[name] for name in ARM], abs=0.005)
+    (report,) = robot.reports
+    assert report["method"]["address"] == "episode 0 of dataset dataset" and len(report["method"]["sources"]) == 64
+
+    state = RunPolicy(dataset=str(tmp_path / "dataset"), rate=10.0, horizon=10)
+    assert robot.run(state) == "fail"
+    assert "it has 30 actions per second, the task 10; set rate" in state.reason
+    assert robot.reports[0]["figures"]["method_fault"] == MethodFault.INVALID_RESULT
+
+
+def export_motion(samples: list[JointTrajectoryControllerState], folder: Path) -> None:
+    """Exports a motion as `export --lerobot` does, from the file that the recording of an episode contains."""
+    columns = {"time_s": [sample.header.stamp.to_sec() for sample in samples]}
+    for index, name in enumerate(samples[0].joint_names):
+        columns[f"{name}/position"] = [sample.actual.positions[index] for sample in samples]
+        columns[f"{name}/command"] = [sample.desired.positions[index] for sample in samples]
+    folder.mkdir()
+    pd.DataFrame(columns).drop_duplicates("time_s").to_parquet(folder / "trajectory.parquet")
+    writer = LeRobotWriter(folder, REPLAY_RATE_HZ, "r", dict.fromkeys(ARM, "rad"))
+    writer.add(read_frames(folder / "trajectory.parquet", REPLAY_RATE_HZ), {}, "reach", succeeded=True)
+    writer.close()

@@ -236,6 +236,21 @@ def test_the_python_files_beside_the_script_of_an_external_method_count(
         before = after
 
 
+def test_the_dataset_that_a_task_replays_counts(stack: Stack, tmp_path: Path) -> None:
+    dataset, task = tmp_path / "picks", tmp_path / "task.yaml"
+    for name in ("meta/info.json", "data/chunk-000/file-000.parquet", "videos/scene.mp4"):
+        (dataset / name).parent.mkdir(parents=True, exist_ok=True)
+        (dataset / name).write_text("1")
+    task.write_text(f"states: [{{A: {{source: run_policy, dataset: {dataset}}}}}]")
+    spec = stack.spec_of_task(task)
+    name = f"dataset {tmp_path.name}/picks"
+    before = stack.digests(spec)[name]
+    (dataset / "videos/scene.mp4").write_text("2")
+    assert stack.digests(spec)[name] == before
+    (dataset / "data/chunk-000/file-000.parquet").write_text("2")
+    assert stack.digests(spec)[name] != before
+
+
 def test_a_mode_without_launch_counts_its_robot_and_method() -> None:
     method = "top_down_grasps.ros_top_down_node:TopDownMethod"
     settings = GraspSettings(robot="ur5_ezgripper_moveit_config", method=method)

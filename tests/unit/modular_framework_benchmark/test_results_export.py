@@ -148,6 +148,18 @@ def test_the_description_of_a_dataset_is_that_of_lerobot_3(dataset: Path) -> Non
     assert set(frames_of(dataset).columns) == columns
 
 
+def test_a_dataset_states_the_units_of_positions_and_commands(tmp_path: Path) -> None:
+    path, folder = store(tmp_path), tmp_path / "picks" / f"episode_{EPISODES[0].number}"
+    record_motion(folder, 0, videos=False)
+    kinds = zip(JOINTS, ("revolute", "prismatic"), strict=True)
+    joints = "".join(f"<joint name='{name}' type='{kind}'/>" for name, kind in kinds)
+    (folder / "parameters.json").write_text(json.dumps({"robot_description": f"<robot name='r'>{joints}</robot>"}))
+    assert export(path, "--lerobot", tmp_path / "dataset", "--rate", RATE) == 0
+    features = json.loads((tmp_path / "dataset" / "meta" / "info.json").read_text())["features"]
+    assert features["action"]["info"] == features["observation.state"]["info"] == {"units": ["rad", "m"]}
+    assert "info" not in features["observation.environment_state"]
+
+
 def test_frames_are_the_motion_at_the_rate_of_the_dataset(dataset: Path) -> None:
     frames = frames_of(dataset)
     assert frames["index"].tolist() == list(range(len(frames)))

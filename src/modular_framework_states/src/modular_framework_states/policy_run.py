@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,52 +28,17 @@ from modular_framework_states.policy_arm import PolicyArm, PolicyMotionError, tr
 from modular_framework_states.policy_cameras import PolicyCameras
 from modular_framework_states.policy_figures import PolicyFigures
 from modular_framework_states.policy_gripper import PolicyGripper
+from modular_framework_states.policy_settings import PolicySettings, RecordedEpisode
 
 if TYPE_CHECKING:
     from modular_framework_states.policy_end_effector import EndEffector
+    from modular_framework_states.policy_replay import RecordedPolicy
 
 Array = npt.NDArray[np.float64]
 
 PERIOD_S = 0.005
 MOTION_WAIT_S = 10.0
 """Maximum time beyond the duration of a chunk, and for the arm to settle at the end [s]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PolicySettings:
-    """Options of a task for a policy.
-
-    Attributes:
-        openpi_keys: Keys of an openpi-style server, by field; empty for a policy of mbf_method.
-        prompt: Instruction for the policy.
-        kind: Meaning of the columns.
-        frame: Frame of end-effector deltas; "" for the planning frame.
-        joints: Joints that the policy moves; empty for all joints of the planning group.
-        postures: Open and closed posture of the gripper; empty without a gripper column.
-        horizon: Number of actions of a chunk.
-        rate_hz: Number of actions per second.
-        executed: Number of actions that run before the next query.
-        accelerates: Whether the acceleration limits of the joints count.
-        clamp: Whether targets outside the limits are moved to the limits.
-        max_duration_s: Maximum duration of the policy [s].
-        must_finish: Whether the policy must be done within the maximum duration.
-        camera_timeout_s: Maximum wait for images [s].
-    """
-
-    openpi_keys: Mapping[str, str]
-    prompt: str
-    kind: str
-    frame: str
-    joints: tuple[str, ...]
-    postures: tuple[str, ...]
-    horizon: int
-    rate_hz: float
-    executed: int
-    accelerates: bool
-    clamp: bool
-    max_duration_s: float
-    must_finish: bool
-    camera_timeout_s: float
 
 
 class PolicyRun:
@@ -85,7 +49,7 @@ class PolicyRun:
         userdata: Userdata with the commander and the client of the gripper.
         settings: Options of the task.
         cameras: Cameras of the observation.
-        client: Client of the policy.
+        source: Client of the policy, or a recorded episode in place of a policy.
     """
 
     def __init__(
@@ -94,11 +58,12 @@ class PolicyRun:
         userdata: Any,
         settings: PolicySettings,
         cameras: PolicyCameras,
-        client: MethodClient,
+        source: MethodClient | RecordedEpisode,
     ) -> None:
-        self._state, self._settings, self._cameras, self._client = state, settings, cameras, client
+        self._state, self._settings, self._cameras = state, settings, cameras
         self._commander = userdata.arm_commander
         self._gripper = _gripper(settings.postures, userdata)
+        self._client = source if isinstance(source, MethodClient) else self._make_recorded_policy(source)
         moves_tip = settings.kind == END_EFFECTOR_DELTAS
         self._joints = self._spec = joint_action_spec(
             self._commander.group,
@@ -121,6 +86,12 @@ class PolicyRun:
 
         solver = load_solver(self._commander.group.name)
         return EndEffector(solver, joints, self._settings.frame, self._commander.positions_of)
+
+    def _make_recorded_policy(self, episode: RecordedEpisode) -> RecordedPolicy:
+        from modular_framework_states.policy_replay import RecordedPolicy  # loads pyarrow
+
+        units = {joint.name: "m" if joint.is_prismatic else "rad" for joint in self._commander.group.joints}
+        return RecordedPolicy(episode, units, self._gripper)
 
     def run(self, work: Work) -> None:
         """Lets the policy drive until it is done or its time is over; the arm is held afterwards.
@@ -251,7 +222,7 @@ def _gripper(postures: tuple[str, ...], userdata: Any) -> PolicyGripper | None:
     return PolicyGripper(opened, closed, userdata.manipulator_controller_client, userdata.max_torque)
 
 
-def _reported(client: MethodClient) -> ReportedMethod:
+def _reported(client: MethodClient | RecordedPolicy) -> ReportedMethod:
     """Returns the report of a started method."""
     return ReportedMethod(
         command=client.source.command,

@@ -21,6 +21,7 @@ from modular_framework_benchmark.episodes.ros_external_methods import command_fi
 from modular_framework_benchmark.episodes.ros_file_digests import (
     file_digest,
     files_with_named,
+    joint_digest,
     model_resources,
     portable_name,
     robot_digests,
@@ -44,8 +45,10 @@ from modular_framework_benchmark.records.level_digests import FILE_PREFIX, combi
 from modular_framework_core.files.model_files import model_file
 from modular_framework_core.launching.ros_launch_preview import leaves
 from modular_framework_core.task_constructor.known_names import MODEL_PATH
-from modular_framework_core.task_constructor.machine_files import text_lists
+from modular_framework_core.task_constructor.machine_files import task_texts
 
+DATASET_INFO = "meta/info.json"
+"""File of a LeRobot dataset that describes its episodes."""
 FOLDER_PARAMETERS = ("states_directory", "templates_directory")
 """Launch arguments that name folders of the user's code."""
 LIBRARY_PACKAGES = tuple(
@@ -130,9 +133,9 @@ def _file_digests(file: Path, model_path: str) -> Digests:
 
 
 def _commands(settings: EpisodeSettings) -> list[tuple[str, ...]]:
-    """Returns the commands of external methods and planners, and the lists in a task, such as commands of policies."""
+    """Returns the commands of external methods and planners, and the texts in a task, such as commands of policies."""
     if isinstance(settings, TaskSettings):
-        return [words for file in settings.files for words in text_lists(file)]
+        return [words for file in settings.files for words in task_texts(file) if words]
     parameters: Mapping[str, Any] = {}
     if isinstance(settings, PlanningSettings):
         parameters = leaves(dict(settings.parameters))
@@ -142,8 +145,13 @@ def _commands(settings: EpisodeSettings) -> list[tuple[str, ...]]:
 
 
 def _command_digests(command: Iterable[str]) -> Digests:
-    """Yields the digests of the files in the command of an external method, and of the Python files beside each."""
-    for file in command_files(tuple(command)):
+    """Yields the digests of the files in a command, of the Python files beside each, and of a replayed dataset."""
+    words = tuple(command)
+    for folder in (Path(os.path.expanduser(word)) for word in words):
+        if folder.is_absolute() and (folder / DATASET_INFO).is_file():
+            files = [folder / DATASET_INFO, *sorted(folder.glob("data/*/*.parquet"))]
+            yield f"dataset {portable_name(folder)}", joint_digest(files)
+    for file in command_files(words):
         yield f"{FILE_PREFIX}{portable_name(file)}", file_digest(file)
         if file.parent.name != "bin":
             yield f"folder of {portable_name(file)}", folder_digest(file)

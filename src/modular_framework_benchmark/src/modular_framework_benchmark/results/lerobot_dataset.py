@@ -9,7 +9,9 @@ row per episode: length, tasks, locations of frames and videos), `data/` (a row 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from modular_framework_benchmark.results.errors import ExportError
-from modular_framework_benchmark.results.lerobot_frames import EpisodeFrames
+from modular_framework_benchmark.results.lerobot_frames import ACTION, STATE, EpisodeFrames
 from modular_framework_benchmark.results.lerobot_statistics import (
     FeatureStatistics,
     as_lists,
@@ -40,6 +42,7 @@ DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 MAX_DATA_FILE_MB = 100
 IMAGES = "observation.images."
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
 _SCALARS: dict[str, Any] = {
     "next.done": pa.bool_(),
     "next.success": pa.bool_(),
@@ -54,17 +57,21 @@ _SCALARS: dict[str, Any] = {
 class LeRobotWriter:
     """Writes episodes one after another; `close` writes the metadata."""
 
-    def __init__(self, root: Path, frames_per_second: int, robot_type: str) -> None:
+    def __init__(
+        self, root: Path, frames_per_second: int, robot_type: str, units: Mapping[str, str] = NO_UNITS
+    ) -> None:
         """Stores the arguments; the first episode determines the features.
 
         Args:
             root: Folder of the dataset.
             frames_per_second: Frame rate [Hz].
             robot_type: Robot name in the metadata.
+            units: Unit of each joint, rad or m; joints without a unit have none in the metadata.
         """
         self._root = root
         self._rate = frames_per_second
         self._robot_type = robot_type
+        self._units = units
         self._names: dict[str, tuple[str, ...]] = {}
         self._cameras: dict[str, CameraVideos] = {}
         self._tasks: dict[str, int] = {}
@@ -201,7 +208,7 @@ class LeRobotWriter:
 
     def _features(self) -> dict[str, Any]:
         features: dict[str, Any] = {
-            name: {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
+            name: {"dtype": "float32", "shape": [len(parts)], "names": list(parts), **self._units_of(name)}
             for name, parts in self._names.items()
         }
         for key, camera in self._cameras.items():
@@ -224,6 +231,13 @@ class LeRobotWriter:
         scalars = {name: {"dtype": str(kind), "shape": [1], "names": None} for name, kind in _SCALARS.items()}
         scalars["timestamp"]["dtype"] = "float32"  # pyarrow prints float32 as float
         return features | scalars
+
+    def _units_of(self, feature: str) -> dict[str, Any]:
+        """Returns the units of positions and commands; empty for other features, and if a unit is unknown."""
+        names = self._names[feature]
+        if feature not in (STATE, ACTION) or not self._units.keys() >= set(names):
+            return {}
+        return {"info": {"units": [self._units[name] for name in names]}}
 
     def _write_json(self, name: str, content: object) -> None:
         (self._root / "meta" / name).write_text(json.dumps(content, indent=2), encoding="utf-8")

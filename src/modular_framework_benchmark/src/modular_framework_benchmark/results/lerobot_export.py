@@ -17,6 +17,8 @@ from modular_framework_benchmark.results.lerobot_videos import find_videos
 from modular_framework_urdf import xml_text
 
 DEFAULT_RATE = 30
+UNITS = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
+"""Unit of a position, by type of joint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,10 @@ def export_lerobot(
             record = database.record(number, int(episode))
             if not chosen(record):
                 continue
-            writer = writer or LeRobotWriter(folder, frames_per_second, robot_of(database, record))
+            if writer is None:
+                writer = LeRobotWriter(
+                    folder, frames_per_second, robot_of(database, record), joint_units(database, record)
+                )
             try:
                 _add_episode(writer, database, record, frames_per_second)
             except ExportError as error:
@@ -98,6 +103,13 @@ def robot_of(database: ResultDatabase, record: EpisodeRecord) -> str:
     """Returns the robot name from the recorded description of an episode, or `unknown`."""
     urdf, _ = read_descriptions(database.folder / record.folder)
     return (urdf and xml_text.parse(urdf, "the recorded robot description").get("name")) or "unknown"
+
+
+def joint_units(database: ResultDatabase, record: EpisodeRecord) -> dict[str, str]:
+    """Returns the unit of each joint in the recorded description of an episode, rad or m."""
+    urdf, _ = read_descriptions(database.folder / record.folder)
+    joints = xml_text.parse(urdf, "the recorded robot description").iter("joint") if urdf else ()
+    return {joint.get("name", ""): UNITS[kind] for joint in joints if (kind := joint.get("type", "")) in UNITS}
 
 
 def task_of(record: EpisodeRecord) -> str:

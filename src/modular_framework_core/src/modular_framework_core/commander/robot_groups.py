@@ -31,6 +31,7 @@ class Joint:
         effort: Effort limit [N m or N]; infinity without a limit.
         velocity: Velocity limit [rad/s or m/s]; infinity without a limit.
         acceleration: Acceleration limit [rad/s^2 or m/s^2]; infinity without a limit.
+        is_prismatic: Whether the position is a distance [m] instead of an angle.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Joint:
     effort: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    is_prismatic: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,7 @@ def _joint(joint: UrdfJoint, entry: Mapping[str, Any]) -> Joint:
         effort=math.inf if limit is None or limit.effort is None else limit.effort,
         velocity=known.velocity,
         acceleration=known.acceleration,
+        is_prismatic=joint.kind == "prismatic",
     )
 
 

@@ -99,8 +99,10 @@ def machine_files(script: Path) -> tuple[Path, ...]:
 
 
 @lru_cache(maxsize=64)
-def text_lists(file: Path) -> tuple[tuple[str, ...], ...]:
-    """Returns the lists of texts in a task or a machine, such as the command of a policy; none if it is unreadable.
+def task_texts(file: Path) -> tuple[tuple[str, ...], ...]:
+    """Returns the texts in a task or a machine, such as the command of a policy; none if it is unreadable.
+
+    Each list and each single value of a key is an entry.
 
     The cache makes the same assumption as the cache of `machine_files`.
 
@@ -111,8 +113,13 @@ def text_lists(file: Path) -> tuple[tuple[str, ...], ...]:
         root = located_yaml.load(file, FaultList())
     except TaskFault:
         return ()
-    lists = (node.items for node in _nodes(root) if isinstance(node, Sequence))
-    return tuple(tuple(str(item.value) for item in items if isinstance(item, Scalar)) for items in lists)
+    entries: list[tuple[Node, ...]] = []
+    for node in _nodes(root):
+        if isinstance(node, Sequence):
+            entries.append(node.items)
+        elif isinstance(node, Mapping):
+            entries += [(value,) for value in node.entries.values()]
+    return tuple(tuple(str(item.value) for item in items if isinstance(item, Scalar)) for items in entries)
 
 
 def _nodes(node: Node) -> Iterator[Node]:

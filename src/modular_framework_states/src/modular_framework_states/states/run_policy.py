@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal, Unpack
 
 from mbf_method.errors import CallCancelledError, MethodError
@@ -23,7 +24,8 @@ from modular_framework_ros.reported_figures import POLICY_FAULT
 from modular_framework_states.grasp_goals import GraspGoalError
 from modular_framework_states.policy_arm import PolicyMotionError
 from modular_framework_states.policy_cameras import PolicyCameraError, PolicyCameras
-from modular_framework_states.policy_run import PolicyRun, PolicySettings
+from modular_framework_states.policy_run import PolicyRun
+from modular_framework_states.policy_settings import PolicySettings, RecordedEpisode
 
 FAULTS = (CallError, GraspGoalError, PolicyCameraError, PolicyMotionError, RobotModelError)
 
@@ -38,6 +40,8 @@ class RunPolicy(FrameworkState):
     Args:
         command: Program and arguments that start the policy, without a shell; the process ends with the state.
         address: Address of a running policy, such as ws://127.0.0.1:8700, instead of ``command``.
+        dataset: Folder of a LeRobot dataset whose ``episode`` is replayed at its ``rate``, instead of ``command``.
+        episode: Index of the episode in ``dataset``, from 0.
         openpi_keys: Keys of an openpi-style server at ``address``, by the field they receive: positions, gripper, state
             (positions and gripper), prompt, or a camera; empty for a policy of mbf_method.
         cameras: Topics of colour images, by the name of the camera.
@@ -70,6 +74,8 @@ class RunPolicy(FrameworkState):
         self,
         command: Sequence[str] = (),
         address: str = "",
+        dataset: str = "",
+        episode: Annotated[int, Limits(at_least=0, at_most=1000000000)] = 0,
         openpi_keys: Mapping[str, str] | None = None,
         cameras: Mapping[str, str] | None = None,
         depth_cameras: Mapping[str, str] | None = None,
@@ -112,6 +118,7 @@ class RunPolicy(FrameworkState):
         )
         protocol = OPENPI if openpi_keys else PROTOCOL
         self._source = MethodSource(tuple(command), address, record_inputs, protocol)
+        self._recorded = RecordedEpisode(Path(dataset).expanduser(), int(episode)) if dataset else None
         self._limits = MethodLimits(float(start_limit), float(time_limit), int(size_limit))
         faults = self._option_faults(openpi_fields(cameras or {}))
         if faults:
@@ -120,8 +127,11 @@ class RunPolicy(FrameworkState):
 
     def _option_faults(self, fields: Sequence[str]) -> list[str]:
         faults, settings = [], self._settings
-        if bool(self._source.command) == bool(self._source.address):
-            faults.append("give either command or address")
+        sources = (self._source.command, self._source.address, self._recorded)
+        if sum(map(bool, sources)) != 1:
+            faults.append("give either command, address or dataset")
+        if self._recorded is not None and settings.kind != "positions":
+            faults.append(f"dataset needs the actions positions; actions is {settings.kind}")
         if settings.openpi_keys and not self._source.address:
             faults.append("openpi_keys needs the address of a server")
         if unknown := sorted(set(settings.openpi_keys) - set(fields)):
@@ -141,7 +151,7 @@ class RunPolicy(FrameworkState):
         client = MethodClient(self._source, ACTIONS, self._limits)
         with self._reporter.work("run_policy") as work:
             try:
-                PolicyRun(self, userdata, self._settings, self._cameras, client).run(work)
+                PolicyRun(self, userdata, self._settings, self._cameras, self._recorded or client).run(work)
             except MethodError as error:
                 work.figures[POLICY_FAULT] = float(error.fault)
                 work.reason = f"the policy failed: {error}"
