@@ -7,6 +7,7 @@ import json
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,6 +25,11 @@ from websockets.sync.server import ServerConnection, serve
 import smach
 from mbf_method.errors import MethodFault
 from mbf_method.wire import pack, unpack
+from modular_framework_benchmark.experiments.task_mode import TaskSettings
+from modular_framework_benchmark.metrics.failure_classes import FailureClass, failure_class
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.metrics.recording_files import reports_of
+from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.results.lerobot_dataset import LeRobotWriter
 from modular_framework_benchmark.results.lerobot_frames import read_frames
 from modular_framework_core.commander.robot_groups import read_group
@@ -58,7 +64,7 @@ class Robot:
         rospy.Subscriber("component_reports", String, lambda message: self.reports.append(json.loads(message.data)))
         self.commander = SimpleNamespace(group=read_group(urdf, srdf, "arm"), positions_of=self._monitor.positions)
         self.gripper = SteadyActionClient("moveit_grasp_action_server", GraspAction)
-        self._arm = PolicyArm("arm/follow_joint_trajectory", ARM, 0.5)
+        self._arm = PolicyArm("arm/follow_joint_trajectory", ARM, 1.0)
         self._arm.connect()
         assert wait_until(lambda: len(self.positions()) == 3, 60.0)
 
@@ -153,26 +159,59 @@ def test_a_policy_without_an_end_drives_for_its_duration(robot: Robot) -> None:
     assert "the policy was not done within 0.5 s" in state.reason
 
 
-@pytest.mark.parametrize(
-    ("fault", "kind", "reason"),
-    [
-        ("exits", MethodFault.NOT_STARTED, "exited with code 3"),
-        ("dies", MethodFault.DIED, "was ended by SIGKILL"),
-        ("hangs", MethodFault.LATE, "no result within 1 s"),
-        ("returns NaN", MethodFault.INVALID_RESULT, "actions[1] has a shoulder that is not finite"),
-        ("leaves the limits", MethodFault.INVALID_RESULT, "to 100.0000; it must be from -2.0000 to 2.0000"),
-    ],
-)
-def test_a_fault_ends_the_state_with_its_kind_and_holds_the_arm(
-    robot: Robot, fault: str, kind: MethodFault, reason: str
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault of a policy: its kind, its class, its cause, and the time after which the state must have ended [s]."""
+
+    kind: MethodFault
+    failure: FailureClass
+    cause: str
+    limit_s: float
+
+
+INVALID, TOO_LARGE = MethodFault.INVALID_RESULT, MethodFault.TOO_LARGE
+LIMIT_S, SIZE_LIMIT, MARGIN_S = 1.0, 50_000, 15.0
+"""Limits of the tests; the margin includes the start of the process and the motion of a chunk on a busy machine."""
+FAULTS = {
+    "exits": Fault(MethodFault.NOT_STARTED, FailureClass.DIED, "exited with code 3", MARGIN_S),
+    "never listens": Fault(MethodFault.NOT_STARTED, FailureClass.DIED, "not ready within 1 s", LIMIT_S + MARGIN_S),
+    "dies": Fault(MethodFault.DIED, FailureClass.DIED, "was ended by SIGKILL", MARGIN_S),
+    "hangs": Fault(MethodFault.LATE, FailureClass.DIED, "no result within 1 s", LIMIT_S + MARGIN_S),
+    "is late": Fault(MethodFault.LATE, FailureClass.DIED, "no result within 1 s", LIMIT_S + MARGIN_S),
+    "raises": Fault(MethodFault.RAISED, FailureClass.INVALID_OUTPUT, "ValueError: no weights", MARGIN_S),
+    "has too few columns": Fault(INVALID, FailureClass.INVALID_OUTPUT, "actions has shape (4, 1)", MARGIN_S),
+    "has too few actions": Fault(INVALID, FailureClass.INVALID_OUTPUT, "actions has shape (3, 2)", MARGIN_S),
+    "returns NaN": Fault(INVALID, FailureClass.INVALID_OUTPUT, "actions[1] has a shoulder that is not", MARGIN_S),
+    "is twice too large": Fault(TOO_LARGE, FailureClass.INVALID_OUTPUT, "larger than 50000 bytes", MARGIN_S),
+    "leaves the limits": Fault(INVALID, FailureClass.INVALID_OUTPUT, "to 100.0000; it must be from -2.0", MARGIN_S),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_ends_the_state_within_its_limit_with_its_class_and_cause_and_holds_the_arm(
+    robot: Robot, name: str
 ) -> None:
-    state = RunPolicy(command=faulty(fault), rate=20.0, horizon=4, time_limit=1.0)
+    robot.move_to([0.0, 0.0])
+    fault = FAULTS[name]
+    start_limit_s = LIMIT_S if name == "never listens" else 60.0
+    limits = {"start_limit": start_limit_s, "time_limit": LIMIT_S, "size_limit": SIZE_LIMIT}
+    state = RunPolicy(command=faulty(name), rate=20.0, horizon=4, **limits)
     assert robot.run(state) == "fail"
-    assert reason in state.reason
-    assert robot.reports[0]["figures"]["method_fault"] == kind
+    assert fault.cause in state.reason
+    (report,) = robot.reports
+    assert report["wall_s"] < fault.limit_s
+    assert report["figures"]["method_fault"] == fault.kind
+    assert failure_of(report) is fault.failure
     assert robot.comes_to_rest()
     start = robot.positions()
     assert not wait_until(lambda: abs(robot.positions()["shoulder"] - start["shoulder"]) > 1e-3, 0.5)
+
+
+def failure_of(report: dict[str, Any]) -> FailureClass | None:
+    """Returns the class of an episode whose task failed with a report."""
+    entry = {**report, "started_s": report["started"], "ended_s": report["ended"], "wall_begin": 0.0, "motion": None}
+    episode = EpisodeMeasurements(TaskSettings(), EpisodeStatus.FAILED, reports=reports_of({"reports": [entry]}))
+    return failure_class(episode, task_succeeded=False)
 
 
 def test_targets_outside_the_limits_are_clamped_on_request(robot: Robot) -> None:
@@ -183,6 +222,7 @@ def test_targets_outside_the_limits_are_clamped_on_request(robot: Robot) -> None
 
 
 def test_answers_that_take_longer_than_an_action_are_counted(robot: Robot) -> None:
+    robot.move_to([0.0, 0.0])
     state = RunPolicy(command=faulty("is slow"), rate=5.0, horizon=4)
     assert robot.run(state) == "success", state.reason
     figures = robot.reports[0]["figures"]

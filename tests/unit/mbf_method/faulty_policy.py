@@ -36,6 +36,8 @@ def steps(observation: Observation) -> Actions:
             os.kill(os.getpid(), signal.SIGKILL)
         case "hangs":
             time.sleep(600.0)
+        case "is late":
+            time.sleep(2.0)
         case "is slow":
             time.sleep(0.3)
         case "raises":
@@ -48,6 +50,8 @@ def steps(observation: Observation) -> Actions:
             actions = actions[:-1]
         case "is too large":
             actions = np.zeros((1_000_000, len(spec.names)))
+        case "is twice too large":
+            actions = np.zeros(100_000 // actions.itemsize)
         case "leaves the limits":
             actions[0, :joints] = 100.0
     return Actions(actions)
@@ -55,4 +59,6 @@ def steps(observation: Observation) -> Actions:
 
 if FAULT == "exits":
     sys.exit(3)
+if FAULT == "never listens":
+    time.sleep(600.0)
 steps.serve()
