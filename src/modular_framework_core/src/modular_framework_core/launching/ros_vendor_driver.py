@@ -98,8 +98,8 @@ class VendorDriver:
             if missing:
                 for publisher in self._cancel:
                     publisher.publish(GoalID())
-                time.sleep(CANCEL_TIME_S)
-                raise DriverLostError(f"the vendor's driver is lost: {missing}")
+                time.sleep(CANCEL_TIME_S)  # in which the other parts of a dead driver are missing too
+                raise DriverLostError(f"the vendor's driver is lost: {self._missing() or missing}")
             time.sleep(WATCH_PERIOD_S)
 
     def _missing(self) -> str:
