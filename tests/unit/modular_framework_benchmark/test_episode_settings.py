@@ -12,7 +12,7 @@ import pytest
 import roslaunch.config
 
 from modular_framework_benchmark.episodes.episode_video import make_video, make_video_apart
-from modular_framework_benchmark.episodes.errors import VideoError
+from modular_framework_benchmark.episodes.errors import SceneError
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.shake_motion import shake_motion
 from modular_framework_benchmark.episodes.stack import write_parameters
@@ -99,7 +99,7 @@ def test_parameters_of_an_episode_replace_those_of_the_launch_file_and_keep_thei
 
 
 def test_a_video_of_what_was_not_recorded_is_refused_with_the_folder(tmp_path: Path) -> None:
-    with pytest.raises(VideoError, match="no motion was recorded"):
+    with pytest.raises(SceneError, match="no motion was recorded"):
         make_video(tmp_path)
     assert str(tmp_path) in make_video_apart(tmp_path)
 

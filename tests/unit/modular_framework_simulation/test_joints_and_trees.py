@@ -10,6 +10,7 @@ import pytest
 
 from modular_framework_simulation.errors import DescriptionError, UnknownEntityError
 from modular_framework_simulation.models.joint_trees import joint_trees
+from modular_framework_simulation.models.model_links import link_poses
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
@@ -125,3 +126,25 @@ def test_an_inertia_of_the_file_is_the_one_the_engine_has(world: PhysicsWorld) -
     moments = [api.getDynamicsInfo(body.number, index, physicsClientId=client)[2] for index in (-1, 0)]
     assert moments[0] == pytest.approx((1, 1, 1))
     assert moments[1] == pytest.approx((1e-3, 1e-3, 1e-3))
+
+
+def test_the_links_of_a_description_are_where_the_engine_has_them(world: PhysicsWorld) -> None:
+    links = link("a") + link("b", x=0.5) + link("c", x=1.0, z=1.5) + link("d", x=1.0, z=1.7)
+    joints = joint("a", "b", pose="0.1 0 0.05 0.3 0.2 0.1") + joint("c", "b", "slide", "prismatic", "0 0.2 0 0 0.4 1")
+    made = model(links + joints + joint("c", "d", "bolt", "fixed"))
+    world.spawn(made)
+    world.set_state("m", BodyState(Pose.from_xyz_rpy((0.3, -0.2, 1.0), (0.1, 0.2, 0.3)), Twist()))
+    body, positions = world.body("m"), {"j": 0.4, "slide": -0.15}
+    body.set_joints(positions)
+    model_in_world = body.state().pose
+    found = link_poses(made, positions)
+    assert set(found) == {"a", "b", "c", "d"}
+    for name, pose in found.items():
+        expected = body.link_state(name).pose
+        distance_m, angle_rad = (model_in_world @ pose).distance_to(expected)
+        assert distance_m < 1e-5 and angle_rad < 1e-3, name  # the arc cosine of small angles is inaccurate
+
+
+def test_loose_links_have_no_pose_in_the_frame_of_the_model() -> None:
+    assert set(link_poses(model(link("a") + link("b", x=1.0)), {})) == {"a"}
+    assert set(link_poses(model("<static>1</static>" + link("a") + link("b", x=1.0)), {})) == {"a", "b"}

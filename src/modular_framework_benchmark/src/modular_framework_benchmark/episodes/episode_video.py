@@ -3,16 +3,14 @@
 
     python3 -m modular_framework_benchmark.episodes.episode_video EPISODE_FOLDER
 
-The world is rebuilt from the recorded parameters. Each frame sets joints and objects to their recorded states.
+The renderer of the simulated cameras draws the recorded scene, without a physics engine or a browser.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,127 +19,73 @@ import numpy as np
 import rospkg
 from numpy.typing import NDArray
 
-from modular_framework_benchmark.episodes.errors import VideoError
-from modular_framework_benchmark.metrics.measurements import ObjectTrack
-from modular_framework_benchmark.metrics.recording_files import PARAMETERS, objects_of, read_joints, read_recording
-from modular_framework_core.files.model_files import model_file
+from modular_framework_benchmark.episodes.errors import SceneError
+from modular_framework_benchmark.episodes.recorded_scene import RecordedScene
 from modular_framework_simulation.errors import SimulationError
-from modular_framework_simulation.models import sdf_specs
-from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
-from modular_framework_simulation.models.model_search import ros_resources
-from modular_framework_simulation.models.model_variants import read_scaled
+from modular_framework_simulation.models.mesh_files import default_cache_folder
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_model_text, read_world
-from modular_framework_simulation.physics.body_urdf import model_to_urdf
-from modular_framework_simulation.physics.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.robot_body import RobotBody
-from modular_framework_simulation.physics.simulated_body import BodyState, Twist
-from modular_framework_simulation.robots.robot_description import read_robot
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
+from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Pinhole
+from modular_framework_simulation.sensors.drawing_choice import AUTO, resolved_drawing
+from modular_framework_simulation.sensors.renderer import Renderer
+from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 
 VIDEO = "video.mp4"
 FRAMES_PER_S = 10
-WIDTH, HEIGHT = 480, 360
 TIMEOUT_S = 600.0
 CODEC, PIXELS = "libx264", "yuv420p"
-FIELD_OF_VIEW_DEG, NEAR_M, FAR_M = 50.0, 0.05, 10.0
-CAMERA_M, CAMERA_YAW_DEG, CAMERA_PITCH_DEG = 1.6, 130.0, -25.0
-"""The camera looks at the mean position of the objects, or at the robot's root, with this distance and these angles."""
+CAMERA = Pinhole(width=480, height=360, horizontal_fov=math.radians(64.0))
+CAMERA_DISTANCE_M, CAMERA_YAW_RAD, CAMERA_PITCH_RAD = 1.6, math.radians(-140.0), math.radians(25.0)
+"""Distance from the moving objects, or from the origin of the world; direction in the x-y plane; angle downwards."""
 CAMERA_ABOVE_M = 0.15
 
 Image = NDArray[np.uint8]
 
 
-class RecordedScene:
-    """World of a recorded episode with its robot and objects."""
+class SceneCamera:
+    """Camera that looks at a recorded scene.
 
-    def __init__(self, folder: Path) -> None:
-        """Builds the world.
+    Args:
+        scene: Recorded scene.
+
+    Raises:
+        SimulationError: The renderer does not work on this machine.
+    """
+
+    def __init__(self, scene: RecordedScene) -> None:
+        self._scene = scene
+        self._renderer = Renderer(resolved_drawing(AUTO), VisualMeshes(default_cache_folder()), _report)
+        self._drawn: set[int] = set()
+        x, y, z = scene.centre
+        rotation = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.0, CAMERA_PITCH_RAD, CAMERA_YAW_RAD))
+        target = Pose((x, y, z + CAMERA_ABOVE_M), rotation.quaternion)
+        self._optical_in_world = target @ Pose((-CAMERA_DISTANCE_M, 0.0, 0.0)) @ OPTICAL_IN_BODY
+
+    def image(self, time_s: float) -> Image:
+        """Returns the image at a time, shape (height, width, 3).
 
         Args:
-            folder: Folder of the episode's files.
-
-        Raises:
-            VideoError: The recording is incomplete.
-            SimulationError: The world cannot be rebuilt.
+            time_s: Time since the start of the recording [s].
         """
-        recording, path = read_recording(folder), folder / PARAMETERS
-        joints = read_joints(folder)
-        if not recording or not path.is_file() or joints is None or not len(joints.times_s):
-            raise VideoError(f"{folder}: no motion was recorded; a video needs an episode whose task began")
-        parameters = json.loads(path.read_text())
-        self._joints, self._tracks = joints, objects_of(recording)
-        self._parts = ConvexParts(default_cache_folder())
-        models = str(parameters.get("gazebo_model_path", ""))
-        self._resources = ros_resources(models)
-        simulation = parameters.get("gazebo", {})
-        self._build_world(str(simulation.get("world_file", "")))
-        for name, model in recording.get("spawned", {}).items():
-            file = model_file(model, models)
-            text = read_scaled(file, recording.get("scales", {}).get(name))
-            self._spawn(replace(read_model_text(text, str(file), self._resources), name=name))
-        description = read_robot(
-            str(parameters.get("robot_description", "")), self._resources.find_package, self._parts, with_visuals=True
-        )
-        name = str(simulation.get("robot_name", "")) or description.name
-        self._robot = RobotBody(self._world, description, name, Pose(), {})
-
-    def _build_world(self, file: str) -> None:
-        spec = read_world(Path(file), self._resources) if file else None
-        self._world = PhysicsWorld(PhysicsSettings(), self._parts, spec.gravity if spec else STANDARD_GRAVITY)
-        for model in spec.models if spec else ():
-            self._spawn(model)
-
-    def _spawn(self, model: sdf_specs.Model) -> None:
-        self._world.spawn(model, model_to_urdf(model, self._parts, True))
-
-    @property
-    def end_s(self) -> float:
-        """Time of the last sample [s since the start of the recording]."""
-        return float(self._joints.times_s[-1])
-
-    def show(self, time_s: float) -> None:
-        """Sets joints and objects to their states at a time [s since the start of the recording]."""
-        row = _latest(self._joints.times_s, time_s)
-        positions = dict(zip(self._joints.joints, self._joints.positions[row].tolist(), strict=True))
-        joint_indices = self._robot.body.joint_indices
-        self._robot.body.set_joints({name: value for name, value in positions.items() if name in joint_indices})
-        present = set(self._world.names())
-        for name, track in self._tracks.items():
-            if name in present and len(track.times_s):
-                self._world.body(name).set_state(BodyState(_pose(track, time_s), Twist()))
-
-    def image(self) -> Image:
-        """Returns a rendered image of shape (HEIGHT, WIDTH, 3)."""
-        api, client = self._world.engine.api, self._world.engine.client
-        view = api.computeViewMatrixFromYawPitchRoll(
-            self._camera_target(), CAMERA_M, CAMERA_YAW_DEG, CAMERA_PITCH_DEG, 0.0, 2, physicsClientId=client
-        )
-        lens = api.computeProjectionMatrixFOV(FIELD_OF_VIEW_DEG, WIDTH / HEIGHT, NEAR_M, FAR_M, physicsClientId=client)
-        _, _, pixels, _, _ = api.getCameraImage(
-            WIDTH, HEIGHT, view, lens, renderer=api.ER_TINY_RENDERER, physicsClientId=client
-        )
-        return np.ascontiguousarray(np.asarray(pixels, dtype=np.uint8).reshape(HEIGHT, WIDTH, 4)[:, :, :3])
-
-    def _camera_target(self) -> list[float]:
-        positions = [track.positions[0] for track in self._tracks.values() if len(track.times_s) > 1]
-        position = np.mean(positions, axis=0) if positions else np.zeros(3)
-        return [float(position[0]), float(position[1]), float(position[2]) + CAMERA_ABOVE_M]
+        poses = self._scene.poses(time_s)
+        present = {model.number: model for model in self._scene.models(poses)}
+        added = {
+            number: tuple(link.visuals for link in model.links)
+            for number, model in present.items()
+            if number not in self._drawn
+        }
+        removed = tuple(self._drawn - set(present))
+        self._renderer.apply(SceneUpdate(poses.time_ns, added, removed, dict(poses.poses), {}))
+        self._drawn = set(present)
+        return self._renderer.image(CAMERA, self._optical_in_world).rgb
 
     def close(self) -> None:
-        """Disconnects the physics engine."""
-        self._world.close()
+        """Closes the renderer; may be called twice."""
+        self._renderer.close()
 
 
-def _latest(times_s: NDArray[np.float64], time_s: float) -> int:
-    return max(int(np.searchsorted(times_s, time_s, side="right")) - 1, 0)
-
-
-def _pose(track: ObjectTrack, time_s: float) -> Pose:
-    row = _latest(track.times_s, time_s)
-    x, y, z = track.positions[row].tolist()
-    qx, qy, qz, qw = track.quaternions[row].tolist()
-    return Pose((x, y, z), (qx, qy, qz, qw))
+def _report(fault: str) -> None:
+    print(fault, file=sys.stderr)
 
 
 def make_video(folder: Path) -> Path:
@@ -154,25 +98,41 @@ def make_video(folder: Path) -> Path:
         Path of `video.mp4` in the folder.
 
     Raises:
-        VideoError: The recording is incomplete.
-        SimulationError: The world cannot be rebuilt.
+        SceneError: The recording is incomplete.
+        SimulationError: The scene cannot be drawn.
     """
     scene, path = RecordedScene(folder), folder / VIDEO
-    try:
-        with av.open(str(path), "w") as container:
-            stream: Any = container.add_stream(CODEC, rate=FRAMES_PER_S)
-            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, PIXELS
-            for number in range(math.floor(scene.end_s * FRAMES_PER_S) + 1):
-                scene.show(number / FRAMES_PER_S)
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(scene.image(), format="rgb24")))
-            container.mux(stream.encode())
-    finally:
-        scene.close()
+    write_video(scene, path, 0.0, scene.end_s)
     return path
 
 
+def write_video(scene: RecordedScene, path: Path, start_s: float, end_s: float) -> None:
+    """Writes a video of a part of a recorded scene, in simulated time.
+
+    Args:
+        scene: Recorded scene.
+        path: MP4 file.
+        start_s: Time of the first frame [s since the start of the recording].
+        end_s: End of the video [s since the start of the recording].
+
+    Raises:
+        SimulationError: The scene cannot be drawn.
+    """
+    camera = SceneCamera(scene)
+    try:
+        with av.open(str(path), "w") as container:
+            stream: Any = container.add_stream(CODEC, rate=FRAMES_PER_S)
+            stream.width, stream.height, stream.pix_fmt = CAMERA.width, CAMERA.height, PIXELS
+            for number in range(math.floor((end_s - start_s) * FRAMES_PER_S) + 1):
+                image = camera.image(start_s + number / FRAMES_PER_S)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+            container.mux(stream.encode())
+    finally:
+        camera.close()
+
+
 def make_video_apart(folder: Path) -> str:
-    """Renders the video in a separate process, because the physics engine is global to a process.
+    """Renders the video in a separate process, because PyBullet is global to a process.
 
     Args:
         folder: Folder of the episode's files.
@@ -194,7 +154,7 @@ def main(arguments: list[str]) -> int:
     """Renders the video of the episode in the given folder."""
     try:
         print(make_video(Path(arguments[0])))
-    except (VideoError, SimulationError, OSError, rospkg.ResourceNotFound) as error:
+    except (SceneError, SimulationError, OSError, rospkg.ResourceNotFound) as error:
         print(f"no video: {error}", file=sys.stderr)
         return 1
     return 0

@@ -10,5 +10,5 @@ class BagError(RuntimeError):
     """A bag is not recorded; the message gives the reason."""
 
 
-class VideoError(RuntimeError):
-    """The video of an episode cannot be rendered; the message gives the reason."""
+class SceneError(RuntimeError):
+    """The scene of an episode cannot be rebuilt; the message gives the reason."""

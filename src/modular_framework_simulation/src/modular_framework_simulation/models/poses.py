@@ -68,3 +68,19 @@ class Pose:
         translation = math.dist(self.position, other.position)
         dot = abs(sum(a * b for a, b in zip(self.quaternion, other.quaternion, strict=True)))
         return translation, 2 * math.acos(min(1.0, dot))
+
+
+def joint_motion(axis: Vector3, position: float, *, is_prismatic: bool) -> Pose:
+    """Returns the pose of a joint's child frame in the joint frame.
+
+    Args:
+        axis: Axis in the joint frame; its length has no effect.
+        position: Position of the joint [rad or m].
+        is_prismatic: Whether the joint translates; otherwise, the joint rotates.
+    """
+    length = math.hypot(*axis) or 1.0
+    x, y, z = (value / length for value in axis)
+    if is_prismatic:
+        return Pose((x * position, y * position, z * position))
+    sine = math.sin(position / 2)
+    return Pose(quaternion=(x * sine, y * sine, z * sine, math.cos(position / 2)))

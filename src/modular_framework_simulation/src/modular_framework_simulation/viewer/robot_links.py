@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 from modular_framework_simulation.errors import DescriptionError
-from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.poses import Pose, joint_motion
 from modular_framework_urdf.mimics import resolve_mimics
 from modular_framework_urdf.robot import Joint, Robot
 
@@ -47,9 +47,10 @@ class RobotLinks:
         poses = {self.root: Pose()}
         for joint in self._joints:
             pose = poses[joint.parent] @ self._origins[joint.name]
-            poses[joint.child] = (
-                pose @ _motion(joint, self._position(joint.name, positions)) if joint.is_movable else pose
-            )
+            if joint.is_movable:
+                position = self._position(joint.name, positions)
+                pose = pose @ joint_motion(joint.axis, position, is_prismatic=joint.kind == "prismatic")
+            poses[joint.child] = pose
         return poses
 
     def tip(self, joints: Collection[str]) -> str:
@@ -104,12 +105,3 @@ def _sorted_from_root(root: str, joints: Sequence[Joint]) -> list[Joint]:
         ordered += children
         links += [joint.child for joint in children]
     return ordered
-
-
-def _motion(joint: Joint, position: float) -> Pose:
-    x, y, z = joint.axis
-    length = math.hypot(x, y, z) or 1.0
-    if joint.kind == "prismatic":
-        return Pose((x / length * position, y / length * position, z / length * position))
-    sine = math.sin(position / 2) / length
-    return Pose(quaternion=(x * sine, y * sine, z * sine, math.cos(position / 2)))
