@@ -21,6 +21,7 @@ const element = (id) => document.getElementById(id);
 const state = { task: null, runs: new Map(), log: new Map(), samples: new Map(), joints: [], drawing: "", viewer: "", record: { title: "", omissions: [], marks: [] }, offset_s: 0, selected: null, view_s: null, pair_s: 0 };
 const rows = new Map(); // rows of the time line, keyed by state path
 const bars = new Map(); // bars of the time line, keyed by run index
+let socket = null;
 const plots = new Plots(element("plots"), (time_s) => { showCursor(time_s); tellPair({ cursor_s: time_s }); });
 
 function make(kind, className, text) {
@@ -89,6 +90,7 @@ function receive(message) {
   if (isNewTask || message.log.length > 0) showLog();
   if (isNewTask || message.samples.length > 0) arePlotsOld = true;
   if (isNewTask && message.task.phase !== "waiting") tellPair({ end_s: end_s() });
+  if (isNewTask) showRecordedWorld();
 }
 
 function merge(entries, changed, oldest) {
@@ -102,7 +104,7 @@ function merge(entries, changed, oldest) {
 function connect() {
   const address = new URL(`live${location.search}`, location.href);
   address.protocol = address.protocol.replace("http", "ws");
-  const socket = new WebSocket(address);
+  socket = new WebSocket(address);
   let isFirst = true;
   socket.onmessage = (event) => {
     if (isFirst) { // a restarted server restarts its indices
@@ -263,6 +265,12 @@ function showWorld(address) {
   element("world").replaceChildren(frame);
 }
 
+/** Tells the server of a record the shown time, so that the world is drawn at this time. */
+function showRecordedWorld() {
+  const isRecord = state.record.title !== "" && state.viewer !== "";
+  if (isRecord && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ view_s: state.view_s }));
+}
+
 // ---- time line -----------------------------------------------------------------------------------------------------
 function clearTimeLine() {
   rows.clear();
@@ -409,6 +417,7 @@ const player = new Player(element("play"), end_s, view);
 /** Shows the task at a time [s since its start]; null shows the latest state. */
 function view(view_s) {
   state.view_s = view_s;
+  showRecordedWorld();
   element("time").classList.toggle("with-view", view_s !== null);
   element("time").style.setProperty("--view", view_s ?? 0);
   plots.setCursor(view_s);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages from the server to the page, as JSON; `web/page.js` reads them.
+"""Messages between the server and the page, as JSON; `web/page.js` is the page.
 
 The first message of a connection contains the whole state of the task. Each later message contains the changes since
 the previous message. Times are in seconds of the server's clock; `now_s` is the time of the message.
@@ -8,10 +8,12 @@ the previous message. Times are in seconds of the server's clock; `now_s` is the
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from typing import Any
 
 from modular_framework_ui.joint_history import JointSample, Quantity
+from modular_framework_ui.recorded_task import ReplayError
 from modular_framework_ui.task_state import TaskChanges
 
 TIME_DIGITS, VALUE_DIGITS = 3, 5
@@ -47,6 +49,27 @@ def fault_text(reason: str) -> str:
         reason: Reason for the page, as a sentence.
     """
     return json.dumps({"fault": reason})
+
+
+def shown_time(text: str | bytes) -> float | None:
+    """Returns the time of a message from the page: `{"view_s": 1.5}`, or null for the end of the task.
+
+    Args:
+        text: JSON message.
+
+    Raises:
+        ReplayError: The message has other content.
+    """
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ReplayError("the message is not JSON") from error
+    match message:
+        case {"view_s": None}:
+            return None
+        case {"view_s": int() | float() as time_s} if math.isfinite(time_s):
+            return float(time_s)
+    raise ReplayError('a page may only send {"view_s": seconds or null}')
 
 
 def _sample(index: int, sample: JointSample) -> dict[str, Any]:

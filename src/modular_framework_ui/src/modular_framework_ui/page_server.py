@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 
 from modular_framework_simulation.viewer.access import Access
 from modular_framework_simulation.viewer.page_connections import PageConnections
-from modular_framework_ui.page_protocol import changes_text, fault_text
+from modular_framework_ui.page_protocol import changes_text, fault_text, shown_time
 from modular_framework_ui.page_source import PAIR_PAGE, RUN_PAGE, TASK_PAGE, PageSource, Query
 from modular_framework_ui.recorded_task import ReplayError
 
@@ -47,12 +47,12 @@ MIN_PERIOD_S = 1 / 30
 """Minimum time between two messages of a connection [s]."""
 MAX_REQUEST_BYTES = 1024
 START_TIMEOUT_S = 10.0
-_READ_ONLY = 1008
-"""WebSocket close code for a page that sends a message."""
+_REFUSED, _REFUSAL = 1008, "the page is read-only except for the time of a recorded world"
+"""WebSocket close code and reason for a page that sends another message."""
 
 
 class PageServer:
-    """Serves the read-only page in a separate thread.
+    """Serves the page in a separate thread. A page can only choose the time of a recorded world.
 
     Args:
         folder: Folder with the files of the page.
@@ -96,12 +96,13 @@ class PageServer:
             self._loop.call_soon_threadsafe(self._set_changed)
 
     def close(self) -> None:
-        """Stops the server without waiting for browsers. May be called twice."""
+        """Stops the server and its source without waiting for browsers. May be called twice."""
         self._connections.close(self._loop)
         with contextlib.suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._ended.set)
         if self._thread.is_alive():
             self._thread.join(START_TIMEOUT_S)
+        self._source.close()
 
     def _run(self) -> None:
         try:
@@ -158,7 +159,7 @@ class PageServer:
         changed = asyncio.Event()
         changed.set()
         self._changed.add(changed)
-        reader = asyncio.create_task(_refuse_messages(connection, changed))
+        reader = asyncio.create_task(self._read_times(connection, changed))
         try:
             assert connection.request is not None
             query = _query(connection.request)
@@ -180,21 +181,25 @@ class PageServer:
             reader.cancel()
             self._changed.discard(changed)
 
+    async def _read_times(self, connection: ServerConnection, changed: asyncio.Event) -> None:
+        """Shows the recorded world at the times that the page sends; refuses any other message.
 
-async def _refuse_messages(connection: ServerConnection, changed: asyncio.Event) -> None:
-    """Closes the connection if the page sends a message.
-
-    Args:
-        connection: Connection of the page.
-        changed: Event for which the sender waits; set at the end of the connection.
-    """
-    try:
-        await connection.recv()
-        await connection.close(_READ_ONLY, "the page is read-only")
-    except ConnectionClosed:
-        pass
-    finally:
-        changed.set()
+        Args:
+            connection: Connection of the page.
+            changed: Event for which the sender waits; set at the end of the connection.
+        """
+        assert connection.request is not None
+        query = _query(connection.request)
+        try:
+            while True:
+                time_s = shown_time(await connection.recv())
+                await asyncio.to_thread(self._source.show, query, time_s)  # may wait for an episode that is being read
+        except ReplayError:
+            await connection.close(_REFUSED, _REFUSAL)
+        except ConnectionClosed:
+            pass
+        finally:
+            changed.set()
 
 
 def _query(request: Request) -> Query:

@@ -45,3 +45,18 @@ class PageSource:
             ReplayError: There is no episode of this number, or its record cannot be read.
         """
         return self._changes_since
+
+    def show(self, query: Query, time_s: float | None) -> None:
+        """Shows the recorded world of the task at a time.
+
+        Args:
+            query: Query of the page.
+            time_s: Time since the start of the task [s]; None for the end of the task.
+
+        Raises:
+            ReplayError: The task is not recorded.
+        """
+        raise ReplayError("the page of a running task is read-only")
+
+    def close(self) -> None:
+        """Ends the viewers of recorded worlds; may be called twice."""

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modular_framework_benchmark.episodes.errors import SceneError
+from modular_framework_benchmark.episodes.recorded_scene import RecordedScene
 from modular_framework_benchmark.metrics.recording_files import (
     EPISODE,
     TASK_RECORDS,
@@ -62,6 +64,8 @@ class RecordedEpisode:
         joints: Samples of the joints; None if not recorded.
         log: Warnings and errors of the log.
         omissions: What the record leaves out, as phrases.
+        scene: Recorded scene; None if not recorded.
+        origin_s: ROS time at the start of the recording [s]; None if not recorded.
     """
 
     title: str
@@ -72,6 +76,12 @@ class RecordedEpisode:
     joints: JointTrack | None = None
     log: tuple[LogLine, ...] = ()
     omissions: tuple[str, ...] = ()
+    scene: RecordedScene | None = None
+    origin_s: float | None = None
+
+    def to_recording_time(self, time_s: float) -> float:
+        """Converts a time since the start of the task [s] to a time since the start of the recording [s]."""
+        return self.task.to_ros_time(time_s) - (self.origin_s or 0.0)
 
 
 def read_episode(path: Path, *, in_simulated_time: bool = False) -> RecordedEpisode:
@@ -88,7 +98,7 @@ def read_episode(path: Path, *, in_simulated_time: bool = False) -> RecordedEpis
         return _read_episode(path, in_simulated_time)
     except ReplayError:
         raise
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ReplayError(
             f"{path}: the files of the episode cannot be read ({type(error).__name__}: {error}); they may be incomplete"
         ) from error
@@ -121,6 +131,7 @@ def _read_episode(path: Path, in_simulated_time: bool) -> RecordedEpisode:
 def _episode_of(folder: Path, task: RecordedTask, log: tuple[LogLine, ...]) -> RecordedEpisode:
     summary, origin_s = _read_summary(folder), read_recording(folder).get("origin_s")
     joints = _joints_of(folder, task, origin_s)
+    scene = _scene_of(folder, task, origin_s)
     missing = [
         ("the joints", joints is None),
         ("the milestones and the judgement of the episode", not summary),
@@ -134,8 +145,28 @@ def _episode_of(folder: Path, task: RecordedTask, log: tuple[LogLine, ...]) -> R
         milestones=_milestones(summary, task, origin_s),
         joints=joints,
         log=log,
-        omissions=("the world", *(name for name, is_missing in missing if is_missing), *_missing_in(task)),
+        omissions=(
+            *_missing_in_world(scene),
+            *(name for name, is_missing in missing if is_missing),
+            *_missing_in(task),
+        ),
+        scene=scene,
+        origin_s=origin_s,
     )
+
+
+def _scene_of(folder: Path, task: RecordedTask, origin_s: float | None) -> RecordedScene | None:
+    """Returns the recorded scene; None if not recorded, or if its times do not fit those of the task."""
+    if origin_s is None or not task.has_ros_times:
+        return None
+    try:
+        return RecordedScene(folder)
+    except SceneError:
+        return None
+
+
+def _missing_in_world(scene: RecordedScene | None) -> tuple[str, ...]:
+    return ("the world",) if scene is None else ("the planning scene", "plans", "camera images", *scene.omissions)
 
 
 def _missing_in(task: RecordedTask) -> tuple[str, ...]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,16 @@ class RecordedTask:
         """
         known_ros, known_s = self._moments()
         return np.interp(ros_s, known_ros, known_s) if len(known_s) else np.full(np.shape(ros_s), np.nan)
+
+    @property
+    def has_ros_times(self) -> bool:
+        """Returns whether readings of the ROS clock are known."""
+        return len(self._moments()[0]) > 0
+
+    def to_ros_time(self, time_s: float) -> float:
+        """Converts a time since the start of the task [s] to a reading of the ROS clock [s]; NaN if unknown."""
+        known_ros, known_s = self._moments()
+        return float(np.interp(time_s, known_s, known_ros)) if len(known_s) else math.nan
 
     def to_simulated_time(self, time_s: float) -> float:
         """Converts a time since the start of the task [s] to simulated time since the start of the task [s].

@@ -16,9 +16,10 @@ from modular_framework_ui.page_source import PageSource
 from modular_framework_ui.recorded_episode import read_episode
 from modular_framework_ui.recorded_run import read_run
 from modular_framework_ui.recorded_task import ReplayError
-from modular_framework_ui.replayed_run import ReplayedRun, drawn_model
+from modular_framework_ui.replayed_episode import EpisodeSource, ReplayedEpisode
+from modular_framework_ui.replayed_run import ReplayedRun
 
-_HOST, _FIRST_PORT = "127.0.0.1", 8090
+HOST, _FIRST_PORT = "127.0.0.1", 8090
 _TASK_SUFFIX = ".json"
 """Suffix of a record by `run_task`."""
 
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str], web_folder: Path) -> int:
     query = _query(chosen)
     try:
         source = replay_source(chosen.replay, chosen.experiment, query)
-        server = PageServer(web_folder, source, _HOST, free_port(_HOST, chosen.port))
+        server = PageServer(web_folder, source, HOST, free_port(HOST, chosen.port))
         server.start()
     except (ReplayError, AddressError, OSError) as error:
         print(f"page: {error}", file=sys.stderr)
@@ -62,8 +63,8 @@ def replay_source(record: str, experiment: str | None = None, query: Mapping[str
     if Path(record).is_dir() or record.endswith(_TASK_SUFFIX):
         if query or experiment:
             raise ReplayError(f"{record}: is a single episode; allowed with the other options: a result database")
-        return PageSource(drawn_model(read_episode(Path(record))).changes_since)
-    source = ReplayedRun(read_run(record, experiment))
+        return EpisodeSource(ReplayedEpisode(read_episode(Path(record)), HOST))
+    source = ReplayedRun(read_run(record, experiment), HOST)
     source.table(query or {})
     return source
 

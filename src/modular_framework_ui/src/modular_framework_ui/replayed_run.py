@@ -8,33 +8,14 @@ import threading
 from dataclasses import asdict
 from typing import Any
 
-from modular_framework_core.task_constructor import machine_graph
-from modular_framework_core.task_constructor.machine_graph import GraphError
 from modular_framework_ui.page_source import PAIR_PAGE, RUN_PAGE, TASK_PAGE, ChangesSince, PageSource, Query
-from modular_framework_ui.recorded_episode import RecordedEpisode, read_episode
+from modular_framework_ui.recorded_episode import read_episode
 from modular_framework_ui.recorded_run import RecordedRun, RunEpisode, differences
 from modular_framework_ui.recorded_task import ReplayError
-from modular_framework_ui.replay import replayed_model
-from modular_framework_ui.task_model import TaskModel
+from modular_framework_ui.replayed_episode import ReplayedEpisode
 
-MAX_MODELS = 8
+MAX_EPISODES = 8
 """Maximum number of episodes in memory."""
-
-
-def drawn_model(episode: RecordedEpisode) -> TaskModel:
-    """Returns the model of a record with the drawing of its state machine.
-
-    Raises:
-        ReplayError: The state machine cannot be drawn.
-    """
-    model = replayed_model(episode)
-    frame = model.frame()
-    if frame is not None:
-        try:
-            model.note_drawing(machine_graph.render(machine_graph.draw(frame).source, "svg").decode())
-        except GraphError as error:
-            raise ReplayError(str(error)) from error
-    return model
 
 
 class ReplayedRun(PageSource):
@@ -48,11 +29,12 @@ class ReplayedRun(PageSource):
 
     Args:
         run: Episodes of the experiment.
+        host: Address of the viewers of recorded worlds.
     """
 
-    def __init__(self, run: RecordedRun) -> None:
-        self._run = run
-        self._models: dict[tuple[int, bool], TaskModel] = {}
+    def __init__(self, run: RecordedRun, host: str) -> None:
+        self._run, self._host = run, host
+        self._episodes: dict[tuple[int, bool], ReplayedEpisode] = {}
         self._lock = threading.Lock()
 
     def page(self, query: Query) -> str:
@@ -85,14 +67,34 @@ class ReplayedRun(PageSource):
         """
         episode = self._run.replayable(_number_of(query.get("episode", "")))
         assert episode.folder is not None
-        key = (episode.number, query.get("clock") == "simulated")
+        key = _key(query)
         with self._lock:
-            if key not in self._models:
-                model = drawn_model(read_episode(episode.folder, in_simulated_time=key[1]))
-                if len(self._models) == MAX_MODELS:
-                    del self._models[next(iter(self._models))]
-                self._models[key] = model
-            return self._models[key].changes_since
+            opened = self._episodes.pop(key, None)
+            if opened is None:
+                if len(self._episodes) == MAX_EPISODES:
+                    self._episodes.pop(next(iter(self._episodes))).close()
+                opened = ReplayedEpisode(read_episode(episode.folder, in_simulated_time=key[1]), self._host)
+            self._episodes[key] = opened  # the latest last
+            return opened.changes_since
+
+    def show(self, query: Query, time_s: float | None) -> None:
+        """Shows the recorded world of an open episode at a time.
+
+        Args:
+            query: Query of the page.
+            time_s: Time since the start of the task [s]; None for the end of the task.
+        """
+        with self._lock:
+            opened = self._episodes.get(_key(query))
+            if opened is not None:
+                opened.show(time_s)
+
+    def close(self) -> None:
+        """Ends the viewers of all episodes; may be called twice."""
+        with self._lock:
+            for opened in self._episodes.values():
+                opened.close()
+            self._episodes.clear()
 
     def _pair(self, text: str) -> str:
         numbers = text.split(",")
@@ -113,6 +115,11 @@ class ReplayedRun(PageSource):
 def _row(episode: RunEpisode) -> dict[str, Any]:
     """Returns an episode as JSON values, without paths of this computer."""
     return asdict(episode) | {"folder": None, "is_replayable": episode.folder is not None}
+
+
+def _key(query: Query) -> tuple[int, bool]:
+    """Returns the number of an episode, and whether its times are simulated."""
+    return _number_of(query.get("episode", "")), query.get("clock") == "simulated"
 
 
 def _number_of(text: str) -> int:
