@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import sqlite3
 import urllib.parse
@@ -10,6 +11,7 @@ import urllib.request
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from lxml import html
@@ -19,9 +21,12 @@ from reported_experiment import MILESTONES, TEXT, ReportedExperiment
 from modular_framework_benchmark.commands.report_command import main
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.failure_groups import EpisodeFiles, Link
+from modular_framework_benchmark.reports.report_source import open_experiment
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode
 from modular_framework_benchmark.reports.time_figures import timelines_figure
 from modular_framework_benchmark.results.database import open_database
+from modular_framework_testing.chromium import Chromium
+from modular_framework_testing.ros_session import until
 
 HOSTILE = (
     "<script>document.documentElement.dataset.hacked = 1</script>",
@@ -160,6 +165,41 @@ def test_a_failure_class_has_the_command_that_lists_its_episodes_with_records(tm
     found = [code.text_content() for code in page.tree.xpath("//details[summary/strong='slipped']/p//code")]
     command = f"{database} --experiment {experiment.name} --failure-class slipped"
     assert set(found) == {f"rosrun modular_framework_ui page --replay {command}"}
+
+
+def test_a_selected_mark_shows_the_command_that_opens_its_episode_or_class(tmp_path: Path) -> None:
+    experiment = replace(SMALL, with_progress=True)
+    database = experiment.store(tmp_path / "results.db")
+    for folder in (tmp_path / f"{experiment.name}_files").iterdir():
+        (folder / "task_records").mkdir()
+    page = Page.of(database, tmp_path / "report.html")
+    figures = page.figures()
+    with open_experiment(str(database), None) as opened:
+        compared, episodes = opened.results.description.compared, opened.results.episodes.set_index("number")
+    dots = [trace for trace in figures["distribution_planning_time"]["data"] if trace.get("meta") == "replay"]
+    for trace, method in zip(dots, ("rrt_connect", "bitstar", "stomp"), strict=True):
+        numbers = [int(option.removeprefix("--episode ")) for option in trace["customdata"]]
+        assert set(episodes.loc[numbers, compared]) == {method}
+        values = np.frombuffer(base64.b64decode(trace["x"]["bdata"]), trace["x"]["dtype"])
+        assert values == pytest.approx(episodes.loc[numbers, "planning_time"].to_numpy())
+        assert trace["text"] == [f"episode {number}" for number in numbers]
+    assert {"--failure-class slipped"} <= set(figures["failures"]["data"][0]["customdata"])
+    command = f"rosrun modular_framework_ui page --replay {database} --experiment {experiment.name}"
+    with Chromium(page.path.as_uri()) as browser:
+        until(lambda: browser.evaluate("document.documentElement?.dataset.drawn"), "the figures", 60.0)
+        for name, option in (("distribution_planning_time", dots[0]["customdata"][0]), ("timelines", "--episode ")):
+            browser.evaluate(
+                f"""(() => {{ const place = document.querySelector('[data-figure="{name}"]');
+                const data = place.data.find((trace) => trace.meta === 'replay');
+                place.emit('plotly_click', {{ points: [{{ data, customdata: data.customdata[0] }}] }}); }})()"""
+            )
+            browser.shows(f"#figure-{name} .replay:not([hidden])", f"{command} {option}")
+
+
+def test_a_mark_of_an_episode_without_a_record_shows_no_command(page: Page) -> None:
+    marked = [trace for figure in page.figures().values() for trace in figure["data"] if trace.get("meta") == "replay"]
+    assert {option for trace in marked for option in trace["customdata"]} == {""}
+    assert "Select a dot" not in page.words and "Select a bar" not in page.words
 
 
 def test_the_episodes_of_the_timelines_are_linked_to_their_files_successes_too(page: Page) -> None:

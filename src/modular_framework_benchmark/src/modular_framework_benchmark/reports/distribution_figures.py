@@ -7,17 +7,20 @@ of points.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.reports.failure_groups import EpisodeFiles
 from modular_framework_benchmark.reports.figure_style import (
     MUTED,
+    REPLAY,
     NamedFigure,
     apply_style,
     axis_title,
@@ -33,35 +36,63 @@ MAX_POINTS = 150  # drawn individually per method
 MIN_DISTINCT_VALUES = 3  # minimum number of distinct values; a table shows fewer values better
 MAX_LIMIT_RATIO = 2.0  # relative to the largest absolute value; a larger limit would compress the values
 
-Values = npt.NDArray[np.float64]
+Values = NDArray[np.float64]
 
 
-def distribution_figures(results: ExperimentResults, methods: Sequence[str]) -> Iterator[NamedFigure]:
-    """Yields a figure for each metric, except rates, with enough distinct values."""
+def distribution_figures(
+    results: ExperimentResults, methods: Sequence[str], files: EpisodeFiles
+) -> Iterator[NamedFigure]:
+    """Yields a figure for each metric, except rates, with enough distinct values.
+
+    Args:
+        results: Finished episodes.
+        methods: Names of the methods.
+        files: Files of the episodes.
+    """
     table = EpisodeTable(results)
+    rows = results.episodes[["number", "folder"]].itertuples(index=False, name=None)
+    options = {int(number): files.episode_option(int(number), str(folder or "")) for number, folder in rows}
     for metric in metrics_of(results):
         if metric.kind is MetricKind.RATE:
             continue
-        values = [_measured_values(table, metric, method) for method in methods]
-        if np.unique(np.concatenate(values)).size >= MIN_DISTINCT_VALUES:
+        dots = [_measured_dots(table, metric, method, options) for method in methods]
+        if np.unique(np.concatenate([each.values for each in dots])).size >= MIN_DISTINCT_VALUES:
             profiles = [performance_profile(results, metric.name, method) for method in methods]
-            yield _distribution_figure(metric, methods, values, profiles)
+            yield _distribution_figure(metric, methods, dots, profiles)
 
 
-def _measured_values(table: EpisodeTable, metric: Metric, method: str) -> Values:
-    """Returns the measured values, without episodes that count at the limit."""
+@dataclass(frozen=True, slots=True)
+class _Dots:
+    """Measured values of a method, ascending, without episodes that count at the limit.
+
+    Attributes:
+        values: Values, shape (n,).
+        numbers: Number of the episode of each value.
+        options: Option that replays the episode of each value; "" without a record.
+    """
+
+    values: Values
+    numbers: tuple[int, ...]
+    options: tuple[str, ...]
+
+
+def _measured_dots(table: EpisodeTable, metric: Metric, method: str, options: Mapping[int, str]) -> _Dots:
     observed = table.observations(metric, method)
-    return observed.values[np.isfinite(observed.values) & ~observed.censored]
+    measured = np.flatnonzero(np.isfinite(observed.values) & ~observed.censored)
+    ascending = measured[np.argsort(observed.values[measured], kind="stable")]
+    numbers = tuple(table.numbers(method)[ascending].tolist())
+    return _Dots(observed.values[ascending], numbers, tuple(options[number] for number in numbers))
 
 
 def _distribution_figure(
-    metric: Metric, methods: Sequence[str], values: Sequence[Values], profiles: Sequence[Curve]
+    metric: Metric, methods: Sequence[str], dots: Sequence[_Dots], profiles: Sequence[Curve]
 ) -> NamedFigure:
+    values = [each.values for each in dots]
     figure = make_subplots(cols=2, column_widths=[0.5, 0.5], horizontal_spacing=0.14)
     names = unique_labels(methods)
     for index, name in enumerate(names):
         if values[index].size:
-            _add_box(figure, name, values[index], index)
+            _add_box(figure, name, dots[index], index)
             _add_profile(figure, name, profiles[index], index, "hv" if metric.better is Direction.LOWER else "vh")
     apply_style(figure, height=max(140 + 62 * len(methods), 290))
     figure.update_xaxes(title_text=axis_title(metric.name, metric.unit))
@@ -75,7 +106,7 @@ def _distribution_figure(
         for column in (1, 2):
             figure.add_vline(x=metric.limit, line={"color": MUTED, "dash": "dot", "width": 1}, row=1, col=column)
     return NamedFigure(
-        f"distribution_{metric.name}", f"Distribution of {spaced_words(metric.name)}", _summary(metric, values), figure,
+        f"distribution_{metric.name}", f"Distribution of {spaced_words(metric.name)}", _summary(metric, dots), figure,
         metric.component,
     )  # fmt: skip
 
@@ -86,7 +117,8 @@ def _shows_limit(metric: Metric, values: Sequence[Values]) -> bool:
     )
 
 
-def _summary(metric: Metric, values: Sequence[Values]) -> str:
+def _summary(metric: Metric, dots: Sequence[_Dots]) -> str:
+    values = [each.values for each in dots]
     text = (
         "Left: box from the lower to the upper quartile with the median; whiskers to the farthest value within 1.5 box "
         "lengths. Right: fraction of the episodes that are at least as good as each value, with its interval; higher "
@@ -95,12 +127,15 @@ def _summary(metric: Metric, values: Sequence[Values]) -> str:
     if metric.limit is not None:
         limit = f"{metric.limit:g} {metric.unit}".strip() + (", dotted" if _shows_limit(metric, values) else "")
         text += f" Episodes at the limit ({limit}) are in no box and no fraction, so a curve may end below 100 %."
+    if any(option for each in dots for option in each.options):
+        text += " Select a dot for the command that opens its episode on the page."
     if any(item.size > MAX_POINTS for item in values):
         text += f" Boxes include all values; {MAX_POINTS} points of each method are drawn, evenly spaced in rank."
     return text
 
 
-def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
+def _add_box(figure: go.Figure, name: str, dots: _Dots, index: int) -> None:
+    values = dots.values
     quartiles = np.quantile(values, (0.25, 0.5, 0.75))
     whisker = 1.5 * (quartiles[2] - quartiles[0])
     within_whiskers = values[(values >= quartiles[0] - whisker) & (values <= quartiles[2] + whisker)]
@@ -113,12 +148,14 @@ def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
         ),
         row=1, col=1,
     )  # fmt: skip
-    points = thinned_values(np.sort(values), MAX_POINTS)
-    jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # evenly spaced, so that the figure is reproducible
+    shown = thinned_ranks(values.size, MAX_POINTS)
+    jitter = 0.09 * np.modf(np.arange(len(shown)) * 0.618)[0]  # evenly spaced, so that the figure is reproducible
     figure.add_trace(
         go.Scatter(
-            x=points, y=index + 0.2 + jitter, mode="markers", showlegend=False, name=name,
-            marker={"color": color_of(index), "size": 4, "opacity": 0.4}, hovertemplate="%{x:.4g}<extra></extra>",
+            x=values[shown], y=index + 0.2 + jitter, mode="markers", showlegend=False, name=name,
+            marker={"color": color_of(index), "size": 4, "opacity": 0.4},
+            text=[f"episode {dots.numbers[rank]}" for rank in shown], hovertemplate="%{text}: %{x:.4g}<extra></extra>",
+            customdata=[dots.options[rank] for rank in shown], meta=REPLAY,
         ),
         row=1, col=1,
     )  # fmt: skip
@@ -145,8 +182,6 @@ def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_
     )  # fmt: skip
 
 
-def thinned_values(ordered: Values, max_count: int) -> Values:
-    """Returns at most `max_count` of the values, evenly spaced in rank, including the first and last value."""
-    if ordered.size <= max_count:
-        return ordered
-    return ordered[np.linspace(0, ordered.size - 1, max_count).round().astype(np.intp)]
+def thinned_ranks(size: int, max_count: int) -> NDArray[np.intp]:
+    """Returns at most `max_count` of the ranks 0 to size - 1, evenly spaced, including the first and the last rank."""
+    return np.linspace(0, size - 1, min(size, max_count)).round().astype(np.intp)

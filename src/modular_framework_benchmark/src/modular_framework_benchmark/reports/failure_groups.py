@@ -18,6 +18,7 @@ from modular_framework_benchmark.metrics.recording_files import TASK_RECORDS
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import FAILURE_CLASS, ExperimentResults
 from modular_framework_benchmark.reports.figure_style import (
+    REPLAY,
     NamedFigure,
     color_of,
     label_text,
@@ -61,19 +62,28 @@ class EpisodeFiles:
     database_folder: Path
     report_folder: Path
 
+    @property
+    def replay(self) -> str:
+        """Returns the start of the commands that replay an episode or a failure class; an option completes them.
+
+        The database of a server is reached with a password, which a report must not contain, so that the option is then
+        the folder of an episode.
+        """
+        if self._is_on_server:
+            return REPLAY_COMMAND
+        return f"{REPLAY_COMMAND} {shlex.join([self.database, '--experiment', self.experiment])}"
+
     def links(self, number: int, folder: str) -> tuple[Link, ...]:
         """Returns links to the folder of an episode and its logs, videos and bags, and the command that replays it.
 
-        There are no links to a folder outside the base. The database of a server is reached with a password, which a
-        report must not contain, so that the command then names the folder.
+        There are no links to a folder outside the base.
 
         Args:
             number: Number of the episode.
             folder: Folder of the episode, relative to `database_folder`; "" for none.
         """
-        root = self.database_folder.resolve()
-        path = (root / folder).resolve()
-        if not folder or not path.is_relative_to(root) or not path.is_dir():
+        path = self._path(folder)
+        if path is None:
             return ()
         files = [item for item in sorted(path.iterdir()) if item.suffix in _KIND_OF_SUFFIX and item.is_file()]
         links = [Link("folder", _relative(path, self.report_folder) + "/")]
@@ -81,21 +91,44 @@ class EpisodeFiles:
             Link(f"{_KIND_OF_SUFFIX[item.suffix]} {item.name}", _relative(item, self.report_folder))
             for item in files[:MAX_FILES]
         ]
-        if (path / TASK_RECORDS).is_dir():
-            command = self._run_command("--episode", str(number)) or f"{REPLAY_COMMAND} {shlex.quote(str(path))}"
-            links.append(Link("replay", command=command))
+        if option := self.episode_option(number, folder):
+            links.append(Link("replay", command=f"{self.replay} {option}"))
         return tuple(links)
+
+    def episode_option(self, number: int, folder: str) -> str:
+        """Returns the option that completes `replay` for an episode; "" without a record of its task.
+
+        Args:
+            number: Number of the episode.
+            folder: Folder of the episode, relative to `database_folder`; "" for none.
+        """
+        path = self._path(folder)
+        if path is None or not (path / TASK_RECORDS).is_dir():
+            return ""
+        return shlex.quote(str(path)) if self._is_on_server else f"--episode {number}"
+
+    def class_option(self, failure_class: str) -> str:
+        """Returns the option that completes `replay` for a failure class; "" without a class or with a server."""
+        if not failure_class or self._is_on_server:
+            return ""
+        return shlex.join(["--failure-class", failure_class])
 
     def class_link(self, failure_class: str) -> Link | None:
         """Returns the command that lists the episodes of a failure class; None without a class or with a server."""
-        command = self._run_command("--failure-class", failure_class)
-        return Link("replay", command=command) if failure_class and command else None
+        option = self.class_option(failure_class)
+        return Link("replay", command=f"{self.replay} {option}") if option else None
 
-    def _run_command(self, *options: str) -> str:
-        """Returns the command that opens the experiment on the page; "" with a server."""
-        if "://" in self.database:
-            return ""
-        return f"{REPLAY_COMMAND} {shlex.join([self.database, '--experiment', self.experiment, *options])}"
+    @property
+    def _is_on_server(self) -> bool:
+        return "://" in self.database
+
+    def _path(self, folder: str) -> Path | None:
+        """Returns the path of the folder of an episode; None without the folder, or outside the base."""
+        if not folder:
+            return None
+        root = self.database_folder.resolve()
+        path = (root / folder).resolve()
+        return path if path.is_relative_to(root) and path.is_dir() else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,11 +273,19 @@ def _relative(path: Path, report_folder: Path) -> str:
     return quote(relative if relative.startswith(".") else f"./{relative}")  # keeps a colon from ending a scheme
 
 
-def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure | None:
-    """Returns a bar chart of the classes of failures by method, or None without failures; of causes without classes."""
+def failures_figure(failures: Failures, methods: tuple[str, ...], files: EpisodeFiles) -> NamedFigure | None:
+    """Returns a bar chart of the classes of failures by method, or None without failures; of causes without classes.
+
+    Args:
+        failures: Unsuccessful episodes.
+        methods: Names of the methods.
+        files: Files of the episodes.
+    """
     if not failures.classes:
         return None
     shown_classes = dict(list(failures.classes.items())[:MAX_BARS])
+    with_records = {group.failure_class for group in failures.groups if group.replay is not None}
+    options = [files.class_option(name) if name in with_records else "" for name in shown_classes]
     names = unique_labels(list(shown_classes), 64)
     figure = go.Figure(
         [
@@ -252,6 +293,7 @@ def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure
                 x=[counts.get(method, 0) for counts in shown_classes.values()], y=names, orientation="h", width=0.6,
                 name=label_text(method), marker={"color": color_of(index), "opacity": 0.85},
                 hovertemplate=f"{label_text(method)}: %{{x:,}}<extra></extra>",
+                customdata=options, meta=REPLAY,
             )
             for index, method in enumerate(methods)
         ]
@@ -259,8 +301,9 @@ def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure
     stacked_bars(figure, height=130 + 34 * len(shown_classes), value_title="episodes")
     noun = "class" if failures.groups[0].failure_class else "cause"
     summary = f"Unsuccessful episodes by {noun} and method."
+    command = " Select a bar for the command that lists its episodes on the page." if any(options) else ""
     if len(failures.classes) > len(shown_classes):
         summary = (
             f"{summary[:-1]}: the {len(shown_classes)} most frequent of {count_phrase(len(failures.classes), noun)}."
         )
-    return NamedFigure("failures", f"Failures by {noun}", summary, figure)
+    return NamedFigure("failures", f"Failures by {noun}", summary + command, figure)

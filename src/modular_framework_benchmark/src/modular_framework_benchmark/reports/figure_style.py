@@ -20,6 +20,8 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F
 DASHES = ("solid", "dash", "dot", "dashdot")
 INK, MUTED, LINES, FAILED = "#1f2933", "#5f6c7b", "#e3e8ee", "#b3261e"
 MAX_LABEL_LENGTH = 48
+REPLAY = "replay"
+"""`meta` of a trace whose `customdata` are the options that replay the episode or class of each mark; "" for none."""
 
 
 @dataclass(frozen=True)

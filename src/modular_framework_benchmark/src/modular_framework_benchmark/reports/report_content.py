@@ -127,6 +127,7 @@ class ReportContent:
         recorded: Versions, machine, parameters.
         warnings: Warnings at the top of the report.
         commands: Commands that repeat the experiment.
+        replay: Start of the commands that replay an episode or a failure class.
     """
 
     description: ExperimentDescription
@@ -144,6 +145,7 @@ class ReportContent:
     recorded: tuple[RecordedValue, ...]
     warnings: tuple[str, ...]
     commands: tuple[str, ...]
+    replay: str
 
     @property
     def is_table(self) -> bool:
@@ -185,13 +187,13 @@ def gather_content(results: ExperimentResults, source: ReportSource, mean_interv
     recorded = recorded_values(source.snapshots)
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods
-    figures = _comparison_figures(results, analysis) + _existing_figures(
+    figures = _comparison_figures(results, analysis, files) + _existing_figures(
         milestones_figure(spans, milestone_episodes(results, source.milestone_levels)),
         *(robustness_figures(robustness) if robustness is not None else ()),
         components_figure(spans, methods),
         levels_figure(levels, methods),
         timelines_figure(chosen, timelines),
-        failures_figure(failures, methods),
+        failures_figure(failures, methods, files),
         progress_figure(results.episodes, results.planned),
     )
     return ReportContent(
@@ -200,6 +202,7 @@ def gather_content(results: ExperimentResults, source: ReportSource, mean_interv
         robustness=robustness, spans=spans, chosen=chosen, failures=failures, figures=tuple(figures), recorded=recorded,
         warnings=warnings_of(results, source.snapshots, source.combinations),
         commands=commands_to_repeat(results, recorded, source.database),
+        replay=files.replay,
     )  # fmt: skip
 
 
@@ -223,13 +226,13 @@ def _robustness(results: ExperimentResults) -> Robustness | None:
     return analyse_robustness(results, with_run_labels(perturbations, labels))
 
 
-def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
+def _comparison_figures(results: ExperimentResults, analysis: Analysis, files: EpisodeFiles) -> list[NamedFigure]:
     return _existing_figures(
         ranking_figure(analysis.summaries, main_metric(results.description)),
         differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS])
         if len(analysis.methods) <= MAX_PAIRED_METHODS
         else None,
-        *distribution_figures(results, analysis.methods),
+        *distribution_figures(results, analysis.methods, files),
     )
 
 

@@ -53,6 +53,7 @@ class ChosenEpisode:
         status: Final status.
         started_cold: Whether the episode was the first of its stack.
         links: Links to its folder and files.
+        option: Option that replays the episode; "" without a record of its task.
     """
 
     number: int
@@ -60,6 +61,7 @@ class ChosenEpisode:
     status: EpisodeStatus
     started_cold: bool
     links: tuple[Link, ...]
+    option: str = ""
 
 
 def choose_episodes(results: ExperimentResults, files: EpisodeFiles) -> tuple[ChosenEpisode, ...]:
@@ -90,6 +92,7 @@ def choose_episodes(results: ExperimentResults, files: EpisodeFiles) -> tuple[Ch
             EpisodeStatus(str(row["status"])),
             bool(row.get(COLD_START, False)),
             files.links(int(row["number"]), str(row["folder"] or "")),
+            files.episode_option(int(row["number"]), str(row["folder"] or "")),
         )
         for row in rows[:MAX_TIMELINES]
     )

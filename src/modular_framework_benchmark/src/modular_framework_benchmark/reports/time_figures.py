@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 
 from modular_framework_benchmark.reports.figure_style import (
     FAILED,
+    REPLAY,
     NamedFigure,
     apply_style,
     color_of,
@@ -83,6 +84,7 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
     figure = go.Figure()
     shown_names: set[str] = set()
     for row, item in enumerate(episodes):
+        first = len(figure.data)
         for span in _leaves(of_episode[item.number]).to_dict("records"):
             _add_span(
                 figure,
@@ -95,6 +97,8 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
             shown_names.add(str(span["name"]))
         for span in _components(of_episode[item.number]).to_dict("records"):
             _add_span(figure, span, y=row + 0.24, width=0.14, color="#5f6c7b", in_legend=False)
+        for bar in figure.data[first:]:
+            bar.update(customdata=[item.option], meta=REPLAY)
     apply_style(figure, height=150 + 52 * len(episodes))
     figure.update_layout(barmode="overlay")
     labels = [
@@ -114,6 +118,8 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
         "States (wide bars) and components (narrow grey bars) of an episode. Red edges: failed; hatched: never "
         "ended. Each method has a success of median duration and the first failure of the most frequent cause."
     )
+    if any(item.option for item in episodes):
+        summary += " Select a bar for the command that opens its episode on the page."
     return NamedFigure("timelines", "Timelines of single episodes", summary, figure)
 
 

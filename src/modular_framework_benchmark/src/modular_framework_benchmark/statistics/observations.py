@@ -196,6 +196,10 @@ class EpisodeTable:
         """Returns the observations of a metric in every finished episode of a method."""
         return self._column(metric).at_rows(self._rows[method])
 
+    def numbers(self, method: str) -> Integers:
+        """Returns the numbers of a method's finished episodes, in the order of `observations`."""
+        return self.results.episodes["number"].to_numpy(np.int64)[self._rows[method]]
+
     def counts(self, metric: Metric, method: str) -> EpisodeCounts:
         """Returns the numbers of a method's episodes by outcome and by their part in a metric's figures."""
         statuses = self._statuses[self._rows[method]]
