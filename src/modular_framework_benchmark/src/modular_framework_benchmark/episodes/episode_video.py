@@ -8,6 +8,7 @@ The renderer of the simulated cameras draws the recorded scene, without a physic
 
 from __future__ import annotations
 
+import contextlib
 import math
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from typing import Any
 
 import av
 import numpy as np
+import PIL.Image
 import rospkg
 from numpy.typing import NDArray
 
@@ -25,6 +27,7 @@ from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models.mesh_files import default_cache_folder
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
+from modular_framework_simulation.physics.pybullet_engine import silenced_output
 from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Pinhole
 from modular_framework_simulation.sensors.drawing_choice import AUTO, resolved_drawing
 from modular_framework_simulation.sensors.renderer import Renderer
@@ -54,7 +57,9 @@ class SceneCamera:
 
     def __init__(self, scene: RecordedScene) -> None:
         self._scene = scene
-        self._renderer = Renderer(resolved_drawing(AUTO), VisualMeshes(default_cache_folder()), _report)
+        drawing = resolved_drawing(AUTO)
+        with silenced_output():
+            self._renderer = Renderer(drawing, VisualMeshes(default_cache_folder()), _report)
         self._drawn: set[int] = set()
         x, y, z = scene.centre
         rotation = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.0, CAMERA_PITCH_RAD, CAMERA_YAW_RAD))
@@ -77,11 +82,13 @@ class SceneCamera:
         removed = tuple(self._drawn - set(present))
         self._renderer.apply(SceneUpdate(poses.time_ns, added, removed, dict(poses.poses), {}))
         self._drawn = set(present)
-        return self._renderer.image(CAMERA, self._optical_in_world).rgb
+        with silenced_output():
+            return self._renderer.image(CAMERA, self._optical_in_world).rgb
 
     def close(self) -> None:
         """Closes the renderer; may be called twice."""
-        self._renderer.close()
+        with silenced_output():
+            self._renderer.close()
 
 
 def _report(fault: str) -> None:
@@ -98,7 +105,7 @@ def make_video(folder: Path) -> Path:
         Path of `video.mp4` in the folder.
 
     Raises:
-        SceneError: The recording is incomplete.
+        SceneError: The recording is incomplete, or the library lacks the encoder.
         SimulationError: The scene cannot be drawn.
     """
     scene, path = RecordedScene(folder), folder / VIDEO
@@ -116,19 +123,38 @@ def write_video(scene: RecordedScene, path: Path, start_s: float, end_s: float) 
         end_s: End of the video [s since the start of the recording].
 
     Raises:
+        SceneError: The library lacks the encoder.
         SimulationError: The scene cannot be drawn.
+        OSError: The file cannot be written.
     """
-    camera = SceneCamera(scene)
-    try:
-        with av.open(str(path), "w") as container:
-            stream: Any = container.add_stream(CODEC, rate=FRAMES_PER_S)
-            stream.width, stream.height, stream.pix_fmt = CAMERA.width, CAMERA.height, PIXELS
-            for number in range(math.floor((end_s - start_s) * FRAMES_PER_S) + 1):
-                image = camera.image(start_s + number / FRAMES_PER_S)
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-            container.mux(stream.encode())
-    finally:
-        camera.close()
+    if CODEC not in av.codecs_available:
+        raise SceneError(
+            f"{path}: PyAV {av.__version__} lacks the encoder {CODEC}; install PyAV from requirements.txt, whose wheel "
+            "contains FFmpeg, or write a .png file"
+        )
+    with contextlib.closing(SceneCamera(scene)) as camera, av.open(str(path), "w", format="mp4") as container:
+        stream: Any = container.add_stream(CODEC, rate=FRAMES_PER_S)
+        stream.width, stream.height, stream.pix_fmt = CAMERA.width, CAMERA.height, PIXELS
+        for number in range(math.floor((end_s - start_s) * FRAMES_PER_S) + 1):
+            image = camera.image(start_s + number / FRAMES_PER_S)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+
+
+def write_picture(scene: RecordedScene, path: Path, time_s: float) -> None:
+    """Writes a picture of a recorded scene.
+
+    Args:
+        scene: Recorded scene.
+        path: PNG file.
+        time_s: Time since the start of the recording [s].
+
+    Raises:
+        SimulationError: The scene cannot be drawn.
+        OSError: The file cannot be written.
+    """
+    with contextlib.closing(SceneCamera(scene)) as camera:
+        PIL.Image.fromarray(camera.image(time_s)).save(path, format="png")
 
 
 def make_video_apart(folder: Path) -> str:

@@ -11,4 +11,4 @@ class BagError(RuntimeError):
 
 
 class SceneError(RuntimeError):
-    """The scene of an episode cannot be rebuilt; the message gives the reason."""
+    """The scene of an episode cannot be rebuilt, or its video cannot be encoded; the message gives the reason."""

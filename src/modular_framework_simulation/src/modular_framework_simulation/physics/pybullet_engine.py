@@ -61,7 +61,7 @@ _WELD_FORCE = 1e5
 
 
 @contextlib.contextmanager
-def _silence_output() -> Iterator[None]:
+def silenced_output() -> Iterator[None]:
     """Discards terminal output of the engine's C++ code; its errors are raised as exceptions."""
     saved = [(os.dup(number), number) for number in (1, 2)]
     try:
@@ -77,7 +77,7 @@ def _silence_output() -> Iterator[None]:
 
 def load_pybullet() -> Any:
     """Imports the engine's module without its terminal output."""
-    with _silence_output():
+    with silenced_output():
         import pybullet
     return pybullet
 
@@ -230,7 +230,7 @@ class PyBulletEngine(PhysicsEngine):
         # contact points at once instead of one.
         flags |= self.api.URDF_USE_IMPLICIT_CYLINDER | self.api.URDF_USE_INERTIA_FROM_FILE
         flags |= self.api.URDF_INITIALIZE_SAT_FEATURES
-        with _silence_output():
+        with silenced_output():
             body: int = self.api.loadURDF(str(file), useFixedBase=fixed, flags=flags, physicsClientId=self.client)
         file.unlink()
         return body
