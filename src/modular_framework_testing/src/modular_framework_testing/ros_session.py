@@ -61,9 +61,11 @@ class RosSession(LaunchSession):
 
     Attributes:
         started: All sessions of this process that were not stopped.
+        master_timeout_s: Time for a master to start [s].
     """
 
     started: ClassVar[list[RosSession]] = []
+    master_timeout_s = 20.0
 
     def __init__(self, master_uri: str | None = None) -> None:
         """Chooses a port; starts no process.
@@ -75,26 +77,26 @@ class RosSession(LaunchSession):
         self.started.append(self)
         self._suite_logs = Path(rospkg.get_log_dir()) if master_uri else None
 
-    def start_master(self, timeout_s: float = 20.0) -> None:
+    def start_master(self) -> None:
         """Starts roscore on the session's port.
 
         Raises:
-            AssertionError: The master does not respond within the timeout.
+            AssertionError: The master does not respond within its time.
         """
         self.start(["roscore", "-p", str(self.port)])
-        self._wait_until(self._master_answers, timeout_s, f"a ROS master on port {self.port}")
+        self._wait_for_master()
 
     def launch(self, launch_xml: str | Path, **args: object) -> Launch:
-        """Starts roslaunch on the running master.
+        """Starts roslaunch on the running master, or on a master that another launch is starting.
 
         Args:
             launch_xml: Path of a launch file, or its text.
             **args: Arguments `name:=value`.
 
         Raises:
-            AssertionError: No master runs; roslaunch would wait for one forever.
+            AssertionError: No master responds within its time; roslaunch would wait forever.
         """
-        assert self._master_answers(), f"no ROS master on port {self.port}; call start_master before launch"
+        self._wait_for_master()
         number = len(self._launches)
         path = Path(launch_xml) if isinstance(launch_xml, Path) else self.folder / f"launch_{number}.launch"
         if isinstance(launch_xml, str):
@@ -153,6 +155,10 @@ class RosSession(LaunchSession):
 
     def _run_id(self) -> str:
         return str(rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"]).getParam("/run_id"))
+
+    def _wait_for_master(self) -> None:
+        what = f"a ROS master on port {self.port}, started by start_master or by another launch"
+        self._wait_until(self._master_answers, self.master_timeout_s, what)
 
     def _master_answers(self) -> bool:
         return rosgraph.is_master_online(self.env["ROS_MASTER_URI"])
