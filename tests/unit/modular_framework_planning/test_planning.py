@@ -174,7 +174,9 @@ def test_an_answer_says_how_long_each_part_of_the_plan_took(model: RobotModel, p
     answer = pipeline.plan(PlanningRequest(table_scene(model), GROUP, (down(0.1, 0.5, 0.95),)))
     assert set(answer.phases_s) == {"setup", "goals", "search", "repair", "shortening", "timing", "check"}
     assert all(spent > 0.0 for spent in answer.phases_s.values())
-    assert 0.5 * answer.total_time_s < sum(answer.phases_s.values()) <= answer.total_time_s
+    total_s = sum(answer.phases_s.values())
+    assert total_s <= answer.total_time_s
+    assert total_s > 0.5 * answer.statistics.processor_s  # between two parts, other processes may take any time
 
 
 def test_scaling_makes_the_motion_slower_in_proportion(model: RobotModel, pipeline: PlanningPipeline) -> None:
