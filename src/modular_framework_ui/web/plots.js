@@ -16,7 +16,7 @@ const QUANTITIES = {
 export class Plots {
   /**
    * @param {HTMLElement} parent Element of the plots.
-   * @param {function(?number): void} onCursor Function that receives the time at the cursor [s]; null without cursor.
+   * @param {function(?number): void} onCursor Function that receives the time at the mouse [s]; null beside the plots.
    */
   constructor(parent, onCursor) {
     this.parent = parent;
@@ -73,7 +73,11 @@ export class Plots {
     if (this.parent.hidden || width <= this.axis.left + this.axis.right) return;
     const height = Math.max(MIN_HEIGHT_PX, Math.floor(this.parent.clientHeight / this.shown.length));
     for (const key of this.shown) {
-      this.plots.set(key, new uPlot({ width, height, ...this.optionsOf(key) }, this.dataOf(key), this.parent));
+      const plot = new uPlot({ width, height, ...this.optionsOf(key) }, this.dataOf(key), this.parent);
+      // uPlot's hook setCursor also reports a cursor that a new size or new data removes
+      plot.over.addEventListener("mousemove", (event) => this.onCursor(timeAt(plot, event)));
+      plot.over.addEventListener("mouseleave", () => this.onCursor(null));
+      this.plots.set(key, plot);
     }
     queueMicrotask(() => this.setCursor(this.cursor_s)); // after uPlot has set the scales
   }
@@ -107,9 +111,6 @@ export class Plots {
           value: (_, value) => valueText(value),
         })),
       ],
-      hooks: {
-        setCursor: [(plot) => this.onCursor(timeAt(plot))],
-      },
     };
   }
 }
@@ -119,10 +120,9 @@ function valueText(value) {
   return value !== 0 && Math.abs(value) < 5e-4 ? value.toExponential(0) : value.toFixed(3);
 }
 
-/** Returns the time at the cursor of a plot [s]; null without cursor. */
-function timeAt(plot) {
-  const time_s = plot.cursor.left < 0 ? NaN : plot.posToVal(plot.cursor.left, "x");
-  return Number.isFinite(time_s) ? time_s : null;
+/** Returns the time at the mouse over a plot [s]. */
+function timeAt(plot, event) {
+  return plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x");
 }
 
 /** Returns names of joints without the word "joint" at the end and without the prefix of a long name. */

@@ -217,6 +217,13 @@ def test_a_pair_opens_from_the_table_and_shares_one_time_and_cursor(server: Page
         until(
             lambda: browser.evaluate(f"{IN_SIDE.format(1)}.querySelector('#time.with-cursor') !== null"), "one cursor"
         )
+        browser.evaluate(
+            f"""(() => {{ const plot = {IN_SIDE.format(1)}.querySelector('#plots .u-over');
+            const area = plot.getBoundingClientRect();
+            plot.dispatchEvent(new MouseEvent('mousemove', {{ clientX: area.left + area.width / 4 }})); }})()"""
+        )
+        cursor = f"{IN_SIDE.format(0)}.querySelector('#time').style.getPropertyValue('--cursor')"
+        until(lambda: float(browser.evaluate(cursor)) == pytest.approx(3.0, abs=0.2), "the time at the mouse on a plot")
         browser.evaluate("document.querySelector('#play').click()")
         browser.shows("#play", "Pause")
         browser.shows("#play", "Play")  # at the later end of the two tasks
