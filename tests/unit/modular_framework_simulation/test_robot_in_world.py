@@ -33,6 +33,7 @@ from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody, Role
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.end_effector_joints import end_effector_joints
 from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_testing.simulation.simulated_samples import exact_state, lift_robot_urdf, solid
 
@@ -414,6 +415,68 @@ def test_each_gripper_of_a_robot_holds_an_object_of_its_own(world: PhysicsWorld,
     assert held == {"one": "palm_a", "other": "palm_b"}
     close("b")
     assert {each.model: each.touch_links[0] for each in loop.held_objects()} == {"other": "palm_b"}
+
+
+HAND_SRDF = """<robot name="lifter"><group name="hand">{joints}</group>
+  <end_effector name="hand" group="hand" parent_link="palm"/></robot>"""
+SECOND_MOTOR = """<transmission name="t3"><type>transmission_interface/SimpleTransmission</type><joint name="slide_2">
+  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint><actuator name="a3"/>
+  </transmission></robot>"""
+
+
+def fixed_jaw_urdf() -> str:
+    """The robot of the samples with a second finger that is fixed to the palm, 3 cm from its middle."""
+    text = lift_robot_urdf()
+    start = text.index('<joint name="slide_2"')
+    end = text.index("</joint>", start)
+    fixed = '<joint name="screwed" type="fixed"><parent link="palm"/><child link="finger_2"/><origin xyz="0.035 0 0"/>'
+    return text[:start] + fixed + text[end:]
+
+
+def two_motors_urdf() -> str:
+    """The robot of the samples with a motor for each finger, and fingers whose joints have parallel axes."""
+    text = re.sub("<mimic [^>]*>", "", lift_robot_urdf()).replace("</robot>", SECOND_MOTOR)
+    start = text.index('<joint name="slide_2"')
+    turned = (
+        text[start:].replace('xyz="-1 0 0"', 'xyz="1 0 0"').replace('lower="0" upper="0.05"', 'lower="-0.05" upper="0"')
+    )
+    return text[:start] + turned
+
+
+@EVERY_ENGINE
+@pytest.mark.parametrize(
+    ("urdf", "joints"),
+    [(fixed_jaw_urdf(), {"slide_1": 0.05}), (two_motors_urdf(), {"slide_1": 0.05, "slide_2": -0.05})],
+)
+def test_a_hand_without_mimic_joints_that_the_srdf_names_holds_an_object(
+    urdf: str, joints: dict[str, float], world: PhysicsWorld, convex_parts: ConvexParts
+) -> None:
+    srdf = HAND_SRDF.format(joints="".join(f'<joint name="{name}"/>' for name in joints))
+    description = read_robot(urdf, no_packages, convex_parts, False, end_effector_joints(srdf, urdf))
+    robot = RobotBody(world, description, "lifter", Pose(), {"lift": -0.235})
+    hardware = SimulatedRobotHW(robot)
+    hardware.init(MappingNodeHandle(), MappingNodeHandle())
+    loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(robot, hardware, Commander()))
+    commands = {each.name: each for each in hardware.get(PositionJointInterface).handles}
+    world.spawn(solid("thing", specs.Box((0.06, 0.03, 0.06)), Pose((0, 0, 0.03))))
+
+    def close(share: float) -> None:
+        for number in range(400):
+            for name, closed in joints.items():
+                commands[name].command = share * closed
+            loop.step()
+            if number % 10 == 0:
+                loop.watch_grasps()
+
+    close(1.0)
+    assert [(held.model, held.carrier_link) for held in loop.held_objects()] == [("thing", "palm")]
+    close(0.0)
+    assert loop.held_objects() == ()
+
+
+def test_an_srdf_that_does_not_fit_the_urdf_is_refused_with_the_name() -> None:
+    with pytest.raises(DescriptionError, match="group 'hand' names the joint 'slide_9', not in the URDF"):
+        end_effector_joints(HAND_SRDF.format(joints='<joint name="slide_9"/>'), lift_robot_urdf())
 
 
 FIXED_PLATE = """<robot name="stand"><link name="world"/>

@@ -19,7 +19,7 @@ from modular_framework_control.ros.ros_controller_manager import RosControllerMa
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
-from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.errors import DescriptionError, SimulationError
 from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
@@ -46,6 +46,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
+from modular_framework_simulation.robots.end_effector_joints import end_effector_joints
 from modular_framework_simulation.robots.robot_description import read_robot
 from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
 from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
@@ -163,11 +164,17 @@ class SimulationNode:
         if not parameters["/robot_description"]:
             rospy.logwarn("no parameter robot_description: the world has no robot")
             return None
+        try:
+            grippers = end_effector_joints(parameters["/robot_description_semantic"], parameters["/robot_description"])
+        except DescriptionError as error:  # Gazebo reads no SRDF
+            rospy.logwarn("%s; only grippers with mimic joints can hold objects", error)
+            grippers = frozenset()
         description = read_robot(
             parameters["/robot_description"],
             self._resources.find_package,
             self._parts,
             self._world.engine.has_window,
+            grippers,
         )
         name = parameters["~robot_name"] or description.name
         positions = description.initial_positions | parse_starting_pose(parameters["~starting_pose"])

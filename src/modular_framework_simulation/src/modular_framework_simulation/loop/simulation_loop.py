@@ -291,12 +291,12 @@ class SimulationLoop:
             return
         robot = self._actors.robot
         for gripper, watch in zip(robot.grippers, self.grasp_watches, strict=True):
-            watch.update(self._time_s(), [self._touched_objects(robot, finger) for finger in gripper.fingers])
+            watch.update(self._time_s(), [self._touched_objects(robot, side) for side in gripper.sides])
         self.world.carry(robot.body, [(held.model, held.carrier_link) for held in self.held_objects()])
 
-    def _touched_objects(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
-        """Returns the names of the movable objects that a finger presses on."""
-        contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
+    def _touched_objects(self, robot: RobotBody, links: Sequence[int]) -> set[str]:
+        """Returns the names of the movable objects that links press on."""
+        contacts = [contact for link in links for contact in self.world.contacts(robot.body, link)]
         # The engine also lists close bodies without contact force.
         return {each.model for each in contacts if each.force > 0.0 and not self.world.body(each.model).static}
 

@@ -22,7 +22,7 @@ from modular_framework_simulation.physics.physics_engine import JointState, Surf
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 from modular_framework_simulation.robots.robot_description import RobotDescription
-from modular_framework_simulation.robots.robot_joint import RobotJoint, gripper_joints
+from modular_framework_simulation.robots.robot_joint import RobotJoint
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 _POSITION_GAIN = 0.2
@@ -79,11 +79,14 @@ class Gripper:
         palm_link: Link that carries the fingers.
         links: Palm and all links below, which may touch a held object.
         fingers: Engine link indices of each finger; the links of a linkage form one finger.
+        sides: Engine link indices of each side between which an object is held: the fingers, or the finger and the palm
+            of a gripper with a single finger.
     """
 
     palm_link: str
     links: tuple[str, ...]
     fingers: tuple[tuple[int, ...], ...]
+    sides: tuple[tuple[int, ...], ...]
 
 
 class _MimicMotion(NamedTuple):
@@ -177,16 +180,21 @@ class RobotBody:
 
     def _grippers(self) -> tuple[Gripper, ...]:
         """Groups the joints of grippers by the palm link of their leading joint."""
-        joints = gripper_joints(self._joints)
+        joints = [joint for joint in self.description.gripper_joints if joint.name in self.body.joint_indices]
         by_name = {joint.name: joint for joint in joints}
         palms: dict[str, dict[str, RobotJoint]] = {}
         for joint in joints:
             leader = by_name.get(joint.mimic.leader, joint) if joint.mimic is not None else joint
             root = self._chain_root(joint, joints)
             palms.setdefault(self._chain_root(leader, joints).parent_link, {})[root.name] = root
-        return tuple(
-            Gripper(palm, self._links_below(palm), self._fingers(list(roots.values()))) for palm, roots in palms.items()
-        )
+        return tuple(self._gripper(palm, list(roots.values())) for palm, roots in palms.items())
+
+    def _gripper(self, palm: str, roots: list[RobotJoint]) -> Gripper:
+        links, fingers = self._links_below(palm), self._fingers(roots)
+        tops = [joint.child_link for joint in self._joints if joint.parent_link in links]
+        moving = {link for top in tops for link in self._links_below(top)}
+        fixed = tuple(self.body.link_indices[link] for link in links if link not in moving)
+        return Gripper(palm, links, fingers, fingers if len(fingers) > 1 else (*fingers, fixed))
 
     def _chain_root(self, joint: RobotJoint, gripper: list[RobotJoint]) -> RobotJoint:
         """Returns the first gripper joint of a chain; fixed links within the chain are allowed."""
@@ -221,7 +229,9 @@ class RobotBody:
         """Returns the axis of a joint in the world frame, directed for an increasing leading joint position."""
         frame = self.world.engine.link_motion(self.body.number, self.body.joint_indices[joint.name]).frame
         x, y, z = rotate_vector(frame.quaternion, joint.axis)
-        length = math.copysign(math.hypot(x, y, z), joint.mimic.multiplier if joint.mimic is not None else 1.0)
+        # jaws with a motor each and parallel axes have opposite ranges
+        direction = joint.mimic.multiplier if joint.mimic is not None else joint.lower + joint.upper
+        length = math.copysign(math.hypot(x, y, z), direction)
         return (x / length, y / length, z / length)
 
     def _links_below(self, top: str) -> tuple[str, ...]:
@@ -325,7 +335,7 @@ class RobotBody:
 
     def _set_surfaces(self) -> None:
         engine, settings = self.world.engine, self.world.settings
-        finger_links = {index for finger in self.fingers for index in finger}
+        finger_links = {index for gripper in self.grippers for side in gripper.sides for index in side}
         pad = Surface(settings.pad_friction, settings.pad_spinning_friction, settings.pad_rolling_friction)
         other = Surface(settings.body_friction, 0.0, 0.0)
         for link, index in self.body.link_indices.items():

@@ -8,13 +8,14 @@ The engine then loads the robot and computes its contacts faster.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.sdf_specs import UNLIMITED_FRICTION, Mesh
-from modular_framework_simulation.robots.robot_joint import RobotJoint
+from modular_framework_simulation.robots.robot_joint import RobotJoint, gripper_joints
 from modular_framework_simulation.robots.robot_masses import give_masses, give_rotors
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import MAX_LENGTH_M
@@ -44,6 +45,7 @@ class RobotDescription:
     Attributes:
         name: Name of the robot in the description.
         joints: Movable joints, in file order.
+        gripper_joints: Joints of the grippers, in file order.
         links: Names of all links, in file order.
         parents: Parent link by child link.
         engine_urdf: URDF for the physics engine.
@@ -53,6 +55,7 @@ class RobotDescription:
 
     name: str
     joints: tuple[RobotJoint, ...]
+    gripper_joints: tuple[RobotJoint, ...]
     links: tuple[str, ...]
     parents: dict[str, str]
     engine_urdf: str
@@ -61,7 +64,11 @@ class RobotDescription:
 
 
 def read_robot(
-    text: str, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool
+    text: str,
+    find_package: PackageFinder,
+    convex_parts: ConvexParts,
+    with_visuals: bool,
+    end_effector_joints: Collection[str] = (),
 ) -> RobotDescription:
     """Reads a robot description.
 
@@ -70,6 +77,7 @@ def read_robot(
         find_package: Function that finds the packages of package:// URIs.
         convex_parts: Converter of collision meshes into convex hulls.
         with_visuals: Whether visual shapes are kept.
+        end_effector_joints: Names of joints of grippers, beside the mimic joints and their leading joints.
 
     Raises:
         DescriptionError: The text is not a valid URDF, or refers to a missing file.
@@ -90,7 +98,8 @@ def read_robot(
     joints = _with_leaders(tuple(_joint(joint, interfaces.get(joint.name, ())) for joint in robot.movable_joints()))
     _set_limits(root, joints)
     give_masses(root, robot, find_package)
-    give_rotors(root, joints)
+    grippers = gripper_joints(joints, end_effector_joints)
+    give_rotors(root, grippers)
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
     parents = {joint.child: joint.parent for joint in robot.joints}
     followers = {joint.name for joint in robot.joints if joint.mimic is not None}
@@ -99,6 +108,7 @@ def read_robot(
     return RobotDescription(
         name=root.get("name", "robot"),
         joints=joints,
+        gripper_joints=grippers,
         links=links,
         parents=parents,
         engine_urdf=text,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from modular_framework_urdf.mimics import Mimic
@@ -39,8 +39,13 @@ class RobotJoint:
     mimic: Mimic | None
 
 
-def gripper_joints(joints: Iterable[RobotJoint]) -> list[RobotJoint]:
-    """Returns the joints of all grippers: mimic joints and their leading joints."""
+def gripper_joints(joints: Iterable[RobotJoint], end_effector_joints: Collection[str]) -> tuple[RobotJoint, ...]:
+    """Returns the joints of all grippers: mimic joints, their leading joints, and the joints of end effectors.
+
+    Args:
+        joints: Movable joints of the robot.
+        end_effector_joints: Names of the joints in the groups of end effectors.
+    """
     joints = list(joints)
-    leaders = {joint.mimic.leader for joint in joints if joint.mimic is not None}
-    return [joint for joint in joints if joint.mimic is not None or joint.name in leaders]
+    names = {joint.mimic.leader for joint in joints if joint.mimic is not None} | {*end_effector_joints}
+    return tuple(joint for joint in joints if joint.mimic is not None or joint.name in names)

@@ -21,7 +21,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_inertial import WATER_KG_PER_M3
 from modular_framework_simulation.models.solid_inertia import inertial_of_shapes
-from modular_framework_simulation.robots.robot_joint import RobotJoint, gripper_joints
+from modular_framework_simulation.robots.robot_joint import RobotJoint
 from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
@@ -58,13 +58,13 @@ def give_rotors(root: Element, joints: Iterable[RobotJoint]) -> None:
 
     Args:
         root: URDF whose links have inertias; changed in place.
-        joints: Joints of the robot.
+        joints: Joints of the grippers.
     """
     revolute_joints = {
         item.get("name") for item in root.findall("joint") if item.get("type") in ("revolute", "continuous")
     }
     inertials = {link.get("name"): link.find("inertial") for link in root.findall("link")}
-    for joint in gripper_joints(joints):
+    for joint in joints:
         inertial = inertials[joint.child_link]
         if joint.name in revolute_joints and joint.velocity > 0.0 and inertial is not None:
             missing_moment = joint.effort * MIN_ACCELERATION_TIME_S / joint.velocity - _moment_about(
