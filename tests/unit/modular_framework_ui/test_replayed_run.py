@@ -217,8 +217,10 @@ def test_a_pair_opens_from_the_table_and_shares_one_time_and_cursor(server: Page
         until(
             lambda: browser.evaluate(f"{IN_SIDE.format(1)}.querySelector('#time.with-cursor') !== null"), "one cursor"
         )
+        plot = f"{IN_SIDE.format(1)}.querySelector('#plots .u-over')"
+        until(lambda: browser.evaluate(f"{plot} !== null"), "the plot of the second episode")
         browser.evaluate(
-            f"""(() => {{ const plot = {IN_SIDE.format(1)}.querySelector('#plots .u-over');
+            f"""(() => {{ const plot = {plot};
             const area = plot.getBoundingClientRect();
             plot.dispatchEvent(new MouseEvent('mousemove', {{ clientX: area.left + area.width / 4 }})); }})()"""
         )
