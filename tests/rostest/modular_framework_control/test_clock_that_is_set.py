@@ -13,13 +13,13 @@ import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from controller_manager_msgs.srv import LoadController, SwitchController
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros.robot_hw_node import RobotHwNode
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.control.ros_controllers import start_controllers
 from modular_framework_testing.ros_session import until
 
 HOUR_S = 3600.0
@@ -55,11 +55,7 @@ def clock(ros_session: Any) -> Iterator[SetClock]:
     node.connect()
     loop = threading.Thread(target=node.run)
     loop.start()
-    rospy.wait_for_service("controller_manager/switch_controller", 60.0)
-    for name in ("states", "arm"):
-        assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)(name).ok
-    switch = rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)
-    assert switch(["states", "arm"], [], 2, False, 0.0).ok
+    start_controllers(["states", "arm"])
     yield system
     ended.set()
     loop.join(10.0)

@@ -28,6 +28,7 @@ from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.control.ros_controllers import start_controllers
 
 MODULE = """
 import rospy
@@ -159,11 +160,7 @@ def diary(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def robot(ros_launch: Callable[..., Any], environment: str, diary: Path) -> Any:
     session = ros_launch(LAUNCH.format(environment=environment, diary=diary))
-    rospy.wait_for_service("controller_manager/load_controller", 60.0)
-    names = ["arm", "wheel", "wrench"]
-    for name in names:
-        assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)(name).ok
-    assert rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)(names, [], 2, False, 0.0).ok
+    start_controllers(["arm", "wheel", "wrench"])
     return session
 
 

@@ -16,11 +16,11 @@ import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from controller_manager_msgs.srv import LoadController, SwitchController
 from rosgraph_msgs.msg import Clock
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_testing.control.ros_controllers import start_controllers
 
 LAUNCH = """
 <launch>
@@ -66,9 +66,7 @@ class ClockSource:
 def clock(ros_launch: Callable[..., Any]) -> Iterator[ClockSource]:
     ros_launch(LAUNCH)
     source = ClockSource()
-    rospy.wait_for_service("controller_manager/switch_controller", 60.0)
-    assert rospy.ServiceProxy("controller_manager/load_controller", LoadController)("arm").ok
-    assert rospy.ServiceProxy("controller_manager/switch_controller", SwitchController)(["arm"], [], 2, False, 0.0).ok
+    start_controllers(["arm"])
     yield source
     source.close()
 

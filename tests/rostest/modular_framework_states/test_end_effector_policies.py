@@ -15,7 +15,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import rospy
-from controller_manager_msgs.srv import LoadController, SwitchController
 from std_msgs.msg import String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
@@ -28,6 +27,7 @@ from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_ros.calls import wait_until
 from modular_framework_states.policy_arm import PolicyArm
 from modular_framework_states.states.run_policy import RunPolicy
+from modular_framework_testing.control.ros_controllers import start_controllers
 
 START = [3.1376, -1.6560, 1.3870, -1.2662, -1.5708, 0.0]
 """A posture far from singularities [rad]."""
@@ -74,14 +74,7 @@ class Robot:
 
 @pytest.fixture(scope="module")
 def robot(ros_session: Any) -> Robot:
-    names = ["joint_state_controller", "arm"]
-    for service, kind in (("load_controller", LoadController), ("switch_controller", SwitchController)):
-        rospy.wait_for_service(f"controller_manager/{service}", 60.0)
-        proxy = rospy.ServiceProxy(f"controller_manager/{service}", kind)
-        if service == "load_controller":
-            assert all(proxy(name).ok for name in names)
-        else:
-            assert proxy(names, [], 2, False, 0.0).ok
+    start_controllers(["joint_state_controller", "arm"])
     return Robot()
 
 

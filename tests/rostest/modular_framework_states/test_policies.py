@@ -17,7 +17,6 @@ import pandas as pd
 import pytest
 import rospy
 from control_msgs.msg import JointTrajectoryControllerState
-from controller_manager_msgs.srv import LoadController, SwitchController
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from websockets.sync.server import ServerConnection, serve
@@ -39,6 +38,7 @@ from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import wait_until
 from modular_framework_states.policy_arm import PolicyArm
 from modular_framework_states.states.run_policy import RunPolicy
+from modular_framework_testing.control.ros_controllers import start_controllers
 
 ROOT = Path(__file__).resolve().parents[3]
 PYTHON = ["/usr/bin/env", f"PYTHONPATH={ROOT / 'src/mbf_method/src'}", sys.executable]
@@ -93,14 +93,7 @@ class Robot:
 
 @pytest.fixture(scope="module")
 def robot(ros_session: Any) -> Robot:
-    names = ["joint_state_controller", "arm", "gripper"]
-    for service, kind in (("load_controller", LoadController), ("switch_controller", SwitchController)):
-        rospy.wait_for_service(f"controller_manager/{service}", 60.0)
-        proxy = rospy.ServiceProxy(f"controller_manager/{service}", kind)
-        if service == "load_controller":
-            assert all(proxy(name).ok for name in names)
-        else:
-            assert proxy(names, [], 2, False, 0.0).ok
+    start_controllers(["joint_state_controller", "arm", "gripper"])
     return Robot()
 
 
