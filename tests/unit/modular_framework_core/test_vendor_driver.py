@@ -21,7 +21,7 @@ def test_the_file_of_the_page_has_no_faults() -> None:
     example = re.search(r"```yaml\n(.*?)```", (ROOT / "docs/vendor_driver.md").read_text(), re.DOTALL)
     assert example is not None
     controllers = yaml.safe_load(example[1])["move_group"]["controller_list"]
-    assert list(controller_list_faults(controllers, ())) == []
+    assert controller_list_faults(controllers, ()) == []
     assert [action.name for action in driver_actions(controllers)] == [
         "/vendor/scaled_pos_joint_traj_controller/follow_joint_trajectory",
         "/vendor/gripper/gripper_cmd",
@@ -36,6 +36,10 @@ def test_the_file_of_the_page_has_no_faults() -> None:
         ({"joints": ["shoulder", "elbw"]}, "has no joint 'elbw'; allowed: shoulder, elbow; did you mean 'elbow'?"),
         ({"joints": []}, "joints is \\[\\]; it must be a list of joint names"),
         ({"name": ""}, "name is ''; it must be the name of a controller"),
+        (
+            {"parallel": True, "joints": ["elbow"]},
+            "'/vendor/arm' is a parallel gripper with 1 joints; it must have two",
+        ),
     ],
 )
 def test_a_fault_of_a_controller_is_named_with_what_is_allowed(change: dict[str, Any], sentence: str) -> None:
@@ -44,8 +48,8 @@ def test_a_fault_of_a_controller_is_named_with_what_is_allowed(change: dict[str,
 
 
 def test_entries_that_are_no_mappings_and_an_empty_list_are_faults() -> None:
-    assert "must be a mapping" in next(controller_list_faults(["arm"], JOINTS))
-    assert "is empty" in next(controller_list_faults([], JOINTS))
+    assert "must be a mapping" in controller_list_faults(["arm"], JOINTS)[0]
+    assert "is empty" in controller_list_faults([], JOINTS)[0]
 
 
 def ready_driver() -> DriverHealth:

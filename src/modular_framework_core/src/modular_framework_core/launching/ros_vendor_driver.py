@@ -52,8 +52,7 @@ class VendorDriver:
             "/move_group/controller_list", "~joint_states", "~program_running", "~services", "~topics",
             "~silence_timeout", "~ready_timeout",
         )  # fmt: skip
-        faults = list(controller_list_faults(controllers, ()))
-        if faults:
+        if faults := controller_list_faults(controllers, ()):
             raise ParameterError("; ".join(f"parameter '/move_group/controller_list' {fault}" for fault in faults))
         self._ready_timeout_s = ready_s or start_timeout()
         self._actions = driver_actions(controllers)

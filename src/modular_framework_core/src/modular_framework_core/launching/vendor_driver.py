@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from modular_framework_planning.trajectory_execution.controllers import ACTION_KINDS, parse_controllers
 from modular_framework_ros.allowed_names import listing, nearest
 
-ACTION_TYPES = ("FollowJointTrajectory", "GripperCommand")
 CONTROLLER_KEYS = (
     "name", "action_ns", "type", "default", "joints", "max_effort", "command_joint", "parallel", "allow_failure",
     "allowed_execution_duration_scaling", "allowed_goal_duration_margin", "path_tolerance", "goal_tolerance",
@@ -24,7 +24,7 @@ class DriverAction:
 
     Attributes:
         name: Resolved name.
-        type: One of ACTION_TYPES.
+        type: One of ACTION_KINDS.
         joints: Joints that the action moves.
     """
 
@@ -43,23 +43,23 @@ def driver_actions(controllers: Iterable[Mapping[str, Any]]) -> tuple[DriverActi
 
     Relative names are in the root namespace, in which move_group runs.
     """
-    return tuple(
-        DriverAction(
-            "/" + "/".join(filter(None, (str(entry["name"]).strip("/"), str(entry.get("action_ns", "")).strip("/")))),
-            str(entry["type"]),
-            tuple(entry["joints"]),
-        )
-        for entry in controllers
-    )
+    specs, _ = parse_controllers(list(controllers), ACTION_KINDS)
+    return tuple(DriverAction("/" + spec.action.strip("/"), spec.kind, spec.joints) for spec in specs)
 
 
-def controller_list_faults(controllers: Sequence[Any], joints: Collection[str]) -> Iterator[str]:
-    """Yields the faults of `controller_list`, each with the index of its entry.
+def controller_list_faults(controllers: Sequence[Any], joints: Collection[str]) -> list[str]:
+    """Returns the faults of `controller_list`, each with the index of its entry.
 
     Args:
         controllers: Value of the parameter.
         joints: Movable joints of the robot; empty if unknown.
     """
+    # move_group would pass over the entries that its parser refuses
+    return list(_name_faults(controllers, joints)) or parse_controllers(list(controllers), ACTION_KINDS)[1]
+
+
+def _name_faults(controllers: Sequence[Any], joints: Collection[str]) -> Iterator[str]:
+    """Yields missing and unknown names."""
     if not controllers:
         yield "is empty; list at least one controller of the driver with name, type and joints"
     for index, entry in enumerate(controllers):
@@ -72,9 +72,9 @@ def controller_list_faults(controllers: Sequence[Any], joints: Collection[str]) 
                 yield f"{where} has no key '{key}'; {listing(CONTROLLER_KEYS)}{nearest(key, CONTROLLER_KEYS)}"
         if not isinstance(entry.get("name"), str) or not entry["name"].strip("/"):
             yield f"{where}: name is {entry.get('name')!r}; it must be the name of a controller"
-        if entry.get("type") not in ACTION_TYPES:
+        if entry.get("type") not in ACTION_KINDS:
             kind = str(entry.get("type"))
-            yield f"{where}: type is '{kind}'; {listing(ACTION_TYPES)}{nearest(kind, ACTION_TYPES)}"
+            yield f"{where}: type is '{kind}'; {listing(ACTION_KINDS)}{nearest(kind, ACTION_KINDS)}"
         named = entry.get("joints")
         if not isinstance(named, list) or not named or not all(isinstance(joint, str) for joint in named):
             yield f"{where}: joints is {named!r}; it must be a list of joint names"
@@ -91,7 +91,7 @@ class DriverHealth:
         actions: Actions of the driver.
         joint_states: Topics with joint states.
         signals: Further topics and services that must exist before the start, as text for messages.
-        program_topic: Topic that tells whether the robot's program runs; empty for none.
+        program_topic: Topic with the state of the robot's program; empty for none.
         silence_timeout_s: Maximum time between messages [s].
     """
 
