@@ -74,6 +74,12 @@ def driver(session: RosSession) -> Iterator[subprocess.Popen[str]]:
     process.communicate()
 
 
+def launch(session: RosSession, folder: Path) -> Launch:
+    """Starts a master and the framework with the configuration folder."""
+    session.start_master()
+    return session.launch(WRAPPER, folder=folder)
+
+
 def wait_for_goal(driver: subprocess.Popen[str], framework: Launch) -> None:
     """Waits until the arm has accepted a goal; fails if the launch ends before."""
     lines: list[str] = []
@@ -86,8 +92,7 @@ def wait_for_goal(driver: subprocess.Popen[str], framework: Launch) -> None:
 def test_a_task_moves_the_arm_of_a_vendor_without_controllers_of_ours(
     session: RosSession, folder: Path, driver: subprocess.Popen[str]
 ) -> None:
-    session.start_master()
-    framework = session.launch(WRAPPER, folder=folder)
+    framework = launch(session, folder)
     wait_for_goal(driver, framework)
     framework.wait(TASK_TIMEOUT_S)
     log = framework.log()
@@ -98,8 +103,7 @@ def test_a_task_moves_the_arm_of_a_vendor_without_controllers_of_ours(
 def test_a_driver_killed_in_a_motion_ends_the_task_with_the_cause(
     session: RosSession, folder: Path, driver: subprocess.Popen[str]
 ) -> None:
-    session.start_master()
-    framework = session.launch(WRAPPER, folder=folder)
+    framework = launch(session, folder)
     wait_for_goal(driver, framework)
     driver.kill()
     framework.wait(TASK_TIMEOUT_S)
@@ -111,8 +115,7 @@ def test_a_driver_killed_in_a_motion_ends_the_task_with_the_cause(
 def test_a_driver_that_is_not_there_ends_the_launch_before_the_first_state(session: RosSession, folder: Path) -> None:
     file = folder / "vendor_driver.yaml"
     file.write_text(file.read_text().replace("ready_timeout: 60.0", "ready_timeout: 2.0"))
-    session.start_master()
-    framework = session.launch(WRAPPER, folder=folder)
+    framework = launch(session, folder)
     framework.wait(TASK_TIMEOUT_S)
     log = framework.log()
     assert "is not ready after 2 s: action /vendor/scaled_pos_joint_traj_controller/follow_joint_trajectory has" in log
