@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads from an SRDF which joints belong to grippers: a URDF without mimic joints does not tell."""
+"""Reads the joints of grippers from an SRDF, because a URDF without mimic joints does not name grippers."""
 
 from __future__ import annotations
 
